@@ -1,0 +1,13 @@
+//! Directions and grids on the sphere. No tensors here.
+//!
+//! # Conventions (the same everywhere in veni)
+//! - The native frame is right-handed with **z up**; the group SO(2) acts on x and y. The azimuth φ runs
+//!   counter-clockwise seen from above (from +x to +y), the polar angle θ is measured from +z.
+//! - An equirectangular image has row 0 on top (+z). Pixel centres: θ = π(j+½)/H, φ = π − 2π(i+½)/W. The
+//!   centre of the image looks along +x, image right is −y (as in Blender; after the usual change from z up
+//!   to y up also as in glTF).
+//! - Angles are radians unless a name says degrees. Directions are unit `[f32; 3]`, colours linear `[f32; 3]`.
+
+mod equirect;
+
+pub use equirect::Equirect;

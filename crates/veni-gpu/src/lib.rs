@@ -1,0 +1,1 @@
+//! The VENI decoder on the GPU.
