@@ -1,1 +1,4 @@
-//! train
+//! Training.
+
+pub mod optimiser;
+pub mod parameters;
