@@ -2,7 +2,8 @@
 
 use crate::data::random::{Purpose, below, normal, permutation, stream, uniform};
 use crate::data::{AugmentConfig, Dataset};
-use crate::sphere::{Equirect, Stripes};
+use crate::sphere::Equirect;
+use crate::train::standin::Stripes;
 use crate::train::config::{LossGrid, Order, TrainConfig};
 
 /// The numbers of one step, row-major, channels last.

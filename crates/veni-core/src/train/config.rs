@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::{AugmentConfig, DataConfig};
 use crate::model::{ModelConfig, StoredType};
-use crate::train::loss::LossConfig;
+use crate::train::standin::LossConfig;
 use crate::train::optimiser::AdamConfig;
-use crate::train::schedule::Schedule;
+use crate::train::standin::Schedule;
 use crate::{Error, Result};
 
 /// A training run.

@@ -1,4 +1,11 @@
 //! Training.
 
+pub mod batch;
+pub mod checkpoint;
+pub mod config;
+pub mod log;
 pub mod optimiser;
 pub mod parameters;
+pub mod presets;
+pub mod standin;
+pub mod step;
