@@ -29,7 +29,7 @@ impl Data {
 
     /// The values of a burn tensor, any rank.
     pub(crate) fn of<const D: usize>(tensor: &Tensor<D>) -> Self {
-        let values = tensor.to_data().convert::<f32>().into_vec().expect("a float tensor");
+        let values = tensor.to_data().convert::<f32>().try_into_vec().expect("a float tensor");
         Self::new(tensor.dims().to_vec(), values)
     }
 
