@@ -1,7 +1,10 @@
-//! The variational auto-encoder: VN-ViT encoder, posterior, and the conditional neural field as decoder.
+//! The models: the decoder (a RENI++ field), the encoder (VN-ViT), and both together.
 
-mod encoder;
-mod posterior;
+pub mod decoder;
+pub mod encoder;
+pub mod posterior;
+pub mod weights;
 
+pub use decoder::Decoder;
 pub use encoder::{Encoder, FoldedEncoder};
 pub use posterior::Posterior;
