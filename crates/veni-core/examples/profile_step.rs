@@ -15,8 +15,8 @@ fn main(){
     let mut sum=[0.0;4]; let n:u64=std::env::var("N").map_or(6,|v|v.parse().unwrap());
     for step in 1..=n { let t=Instant::now(); let batch=b.prepare(step); let t0=t.elapsed().as_secs_f64();
         let t=Instant::now(); let l=batch_loss(&veni,&batch,&c.loss,&dev); let t1=t.elapsed().as_secs_f64();
-        let t=Instant::now(); let mut gr=l.total.backward(); let t2=t.elapsed().as_secs_f64();
-        let t=Instant::now(); let lr=[c.decoder.learning_rate*c.decoder.schedule.factor(step),c.encoder.learning_rate*c.encoder.schedule.factor(step)]; let r; (veni,r)=opt.step(veni,&mut gr,&lr); let t3=t.elapsed().as_secs_f64();
+        let t=Instant::now(); let gr=l.total.backward(); let t2=t.elapsed().as_secs_f64();
+        let t=Instant::now(); let lr=[c.decoder.learning_rate*c.decoder.schedule.factor(step),c.encoder.learning_rate*c.encoder.schedule.factor(step)]; let r; (veni,r)=opt.step(veni,&gr,&lr); let t3=t.elapsed().as_secs_f64();
         if step>1 {for (s,t) in sum.iter_mut().zip([t0,t1,t2,t3]) {*s+=t/(n-1) as f64;}}
         let tot:f32=l.total.into_scalar(); if step<6||step%20==0 {println!("{step} loss {tot:.4} norms {:.3} {:.3}",r[0].gradient_norm,r[1].gradient_norm);}
     }

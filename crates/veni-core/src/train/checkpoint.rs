@@ -12,7 +12,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
 use crate::output::{Overwrite, write_atomic};
-use crate::train::parameters::{Named, Values};
+use crate::vae::weights::{Weight, Weights};
 use crate::{Error, Result};
 
 const KEY: &str = "veni-checkpoint";
@@ -51,7 +51,7 @@ impl CheckpointInfo {
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written; the previous checkpoint is then intact.
-pub fn save(path: &Path, state: &Named, info: &CheckpointInfo) -> Result<()> {
+pub fn save(path: &Path, state: &Weights, info: &CheckpointInfo) -> Result<()> {
     let json = serde_json::to_string(info).map_err(|e| Error::invalid(format!("checkpoint header: {e}")))?;
     let bytes: Vec<_> = state.values().map(|v| little_endian(&v.data)).collect();
     let mut views = Vec::with_capacity(bytes.len());
@@ -71,12 +71,12 @@ pub fn save(path: &Path, state: &Named, info: &CheckpointInfo) -> Result<()> {
 /// # Errors
 /// [`Error::Io`] if it cannot be read; [`Error::Invalid`] if it is damaged; [`Error::Unsupported`] for a format
 /// of another version. All name the file.
-pub fn load(path: &Path) -> Result<(Named, CheckpointInfo)> {
+pub fn load(path: &Path) -> Result<(Weights, CheckpointInfo)> {
     let bytes = fs::read(path).map_err(|e| Error::io(path, "read", e))?;
     parse(&bytes).map_err(|e| e.in_file(path))
 }
 
-fn parse(bytes: &[u8]) -> Result<(Named, CheckpointInfo)> {
+fn parse(bytes: &[u8]) -> Result<(Weights, CheckpointInfo)> {
     let damaged = |e: &dyn std::fmt::Display| Error::invalid(format!("damaged checkpoint: {e}"));
     let (_, header) = SafeTensors::read_metadata(bytes).map_err(|e| damaged(&e))?;
     let json = header.metadata().as_ref().and_then(|m| m.get(KEY));
@@ -90,7 +90,7 @@ fn parse(bytes: &[u8]) -> Result<(Named, CheckpointInfo)> {
     }
     let info: CheckpointInfo = serde_json::from_value(value).map_err(|e| damaged(&e))?;
     let file = SafeTensors::deserialize(bytes).map_err(|e| damaged(&e))?;
-    let mut state = Named::new();
+    let mut state = Weights::new();
     for (name, view) in file.iter() {
         if view.dtype() != Dtype::F32 {
             return Err(damaged(&format!("tensor {name} is {:?}, not F32", view.dtype())));
@@ -99,7 +99,7 @@ fn parse(bytes: &[u8]) -> Result<(Named, CheckpointInfo)> {
         if let Some(bad) = data.iter().find(|v| !v.is_finite()) {
             return Err(damaged(&format!("tensor {name} holds {bad}")));
         }
-        state.insert(name.to_owned(), Values { shape: view.shape().to_vec(), data });
+        state.insert(name.to_owned(), Weight { shape: view.shape().to_vec(), data });
     }
     Ok((state, info))
 }
@@ -116,8 +116,8 @@ mod tests {
     fn what_is_saved_comes_back_to_the_bit_and_damage_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("state.safetensors");
-        let values = Values { shape: vec![2, 1], data: vec![0.1, -3e-30] };
-        let state = Named::from([("first.a".to_owned(), values)]);
+        let values = Weight { shape: vec![2, 1], data: vec![0.1, -3e-30] };
+        let state = Weights::from([("first.a".to_owned(), values)]);
         let info = CheckpointInfo::new(7, Some(Best { step: 5, ldr_psnr: 16.90000001 }));
         save(&path, &state, &info).unwrap();
         save(&path, &state, &info).unwrap();

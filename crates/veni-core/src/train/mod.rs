@@ -5,7 +5,6 @@ pub mod checkpoint;
 pub mod config;
 pub mod log;
 pub mod optimiser;
-pub mod parameters;
 pub mod presets;
 pub mod standin;
 pub mod step;

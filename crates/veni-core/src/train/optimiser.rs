@@ -17,7 +17,7 @@ use burn::tensor::Gradients;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::train::parameters::{self, Named, Values};
+use crate::vae::weights::{self, Weight, Weights};
 use crate::{Error, Result};
 
 /// Adam's constants for one group.
@@ -72,7 +72,7 @@ pub struct Optimiser {
 #[derive(Clone, Debug, PartialEq)]
 struct Slot {
     group: usize,
-    weight: Values,
+    weight: Weight,
     first: Vec<f32>,
     second: Vec<f32>,
     average: Vec<f32>,
@@ -88,7 +88,7 @@ impl Optimiser {
     /// [`Error::Invalid`] if a parameter belongs to no group.
     pub fn new<M: Module>(module: &M, groups: Vec<Group>, ema_decay: f64) -> Result<Self> {
         let mut slots = std::collections::BTreeMap::new();
-        for (path, weight) in parameters::trained(module) {
+        for (path, weight) in weights::read(module, "") {
             let inside = |g: &Group| path.strip_prefix(&g.prefix).is_some_and(|rest| rest.starts_with('.'));
             let group = groups.iter().position(inside);
             let group = group.ok_or_else(|| Error::invalid(format!("parameter {path} is in no optimiser group")))?;
@@ -107,15 +107,15 @@ impl Optimiser {
     /// One update with `learning_rates[g]` for group g. Parameters without a gradient keep weight and moments.
     ///
     /// # Panics
-    /// If there is not one learning rate per group.
+    /// If there is not one learning rate per group, or `module` is of another shape than the state.
     pub fn step<M: Module>(
         &mut self,
         module: M,
-        grads: &mut Gradients,
+        grads: &Gradients,
         learning_rates: &[f64],
     ) -> (M, Vec<GroupReport>) {
         assert_eq!(learning_rates.len(), self.groups.len(), "one learning rate per optimiser group");
-        let grads = parameters::gradients(&module, grads);
+        let grads = weights::gradients(&module, "", grads);
         let norms = self.norms(&grads);
         self.updates += 1;
         let average_decay = self.ema_decay.min(self.updates as f64 / (self.updates as f64 + 9.0));
@@ -127,29 +127,29 @@ impl Optimiser {
                 slot.update(&gradient.data, &rules[slot.group]);
             }
         }
-        let module = parameters::replaced(module, &self.weights());
+        let module = weights::write(module, "", &self.weights()).expect("the module that the state was made for");
         let reports = norms.iter().zip(learning_rates);
         let reports = reports.map(|(&gradient_norm, &learning_rate)| GroupReport { gradient_norm, learning_rate });
         (module, reports.collect())
     }
 
     /// Current weights.
-    pub fn weights(&self) -> Named {
+    pub fn weights(&self) -> Weights {
         self.slots.iter().map(|(path, slot)| (path.clone(), slot.weight.clone())).collect()
     }
 
     /// Averaged weights.
-    pub fn averages(&self) -> Named {
-        let average = |slot: &Slot| Values { shape: slot.weight.shape.clone(), data: slot.average.clone() };
+    pub fn averages(&self) -> Weights {
+        let average = |slot: &Slot| Weight { shape: slot.weight.shape.clone(), data: slot.average.clone() };
         self.slots.iter().map(|(path, slot)| (path.clone(), average(slot))).collect()
     }
 
     /// Everything, for a checkpoint: `weight.*`, `first.*`, `second.*`, `average.*`.
-    pub fn state(&self) -> Named {
-        let mut out = Named::new();
+    pub fn state(&self) -> Weights {
+        let mut out = Weights::new();
         for (path, slot) in &self.slots {
             for (part, data) in PARTS.iter().zip([&slot.weight.data, &slot.first, &slot.second, &slot.average]) {
-                out.insert(format!("{part}.{path}"), Values { shape: slot.weight.shape.clone(), data: data.clone() });
+                out.insert(format!("{part}.{path}"), Weight { shape: slot.weight.shape.clone(), data: data.clone() });
             }
         }
         out
@@ -159,7 +159,7 @@ impl Optimiser {
     ///
     /// # Errors
     /// [`Error::Invalid`] naming a tensor that is missing, superfluous or of another shape.
-    pub fn restore(&mut self, mut state: Named, updates: u64) -> Result<()> {
+    pub fn restore(&mut self, mut state: Weights, updates: u64) -> Result<()> {
         for (path, slot) in &mut self.slots {
             let targets = [&mut slot.weight.data, &mut slot.first, &mut slot.second, &mut slot.average];
             for (part, target) in PARTS.iter().zip(targets) {
@@ -181,7 +181,7 @@ impl Optimiser {
         Ok(())
     }
 
-    fn norms(&self, grads: &Named) -> Vec<f64> {
+    fn norms(&self, grads: &Weights) -> Vec<f64> {
         let mut squares = vec![0.0; self.groups.len()];
         for (path, gradient) in grads {
             let sum: f64 = gradient.data.iter().map(|&g| f64::from(g) * f64::from(g)).sum();
@@ -300,8 +300,8 @@ mod tests {
                 }
             }
             let report;
-            let mut grads = gradients(&toy);
-            (toy, report) = optimiser.step(toy, &mut grads, &rates);
+            let grads = gradients(&toy);
+            (toy, report) = optimiser.step(toy, &grads, &rates);
             assert!((report[0].gradient_norm - norm).abs() < 1e-5);
         }
         let close = |ours: &Param<Tensor<1>>, want: [f64; 2]| {
@@ -317,8 +317,8 @@ mod tests {
     fn restored_state_continues_to_the_bit() {
         let run = |toy: Toy, optimiser: &mut Optimiser, steps| {
             (0..steps).fold(toy, |toy, _| {
-                let mut grads = gradients(&toy);
-                optimiser.step(toy, &mut grads, &[0.1, 0.01]).0
+                let grads = gradients(&toy);
+                optimiser.step(toy, &grads, &[0.1, 0.01]).0
             })
         };
         let mut straight = Optimiser::new(&toy(), groups(), 0.9).unwrap();
@@ -327,7 +327,7 @@ mod tests {
         run(toy(), &mut first, 2);
         let mut second = Optimiser::new(&toy(), groups(), 0.9).unwrap();
         second.restore(first.state(), first.updates()).unwrap();
-        let module = parameters::replaced(toy(), &second.weights());
+        let module = weights::write(toy(), "", &second.weights()).unwrap();
         run(module, &mut second, 2);
         assert_eq!(straight, second);
         // and the average is neither the start nor the end
@@ -343,7 +343,7 @@ mod tests {
         let message = optimiser.restore(state, 1).unwrap_err().to_string();
         assert!(message.contains("first.a.x"), "{message}");
         let mut state = optimiser.state();
-        state.insert("weight.c".into(), Values { shape: vec![1], data: vec![0.0] });
+        state.insert("weight.c".into(), Weight { shape: vec![1], data: vec![0.0] });
         assert!(optimiser.restore(state, 1).unwrap_err().to_string().contains("weight.c"));
         let orphan = Optimiser::new(&toy(), groups()[..1].to_vec(), 0.9).unwrap_err().to_string();
         assert!(orphan.contains("b.x"), "{orphan}");
