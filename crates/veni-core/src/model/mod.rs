@@ -3,5 +3,6 @@
 mod config;
 
 pub use config::{
-    DecoderConfig, EncoderConfig, ModelConfig, ModelKind, Pooling, Reduction, StripeSampling, VectorLayer, VnReluForm,
+    DecoderConfig, EncoderConfig, ModelConfig, ModelKind, Pooling, Reduction, StripeSampling, VectorLayer,
+    VnReluForm,
 };
