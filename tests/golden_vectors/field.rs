@@ -1,16 +1,17 @@
 //! The RENI++ field network: attention conditioning, Vector-Neuron invariance, SO(2).
 //!
 //! Options that our decoder does not have are brought about here: another axis is a permutation of the
-//! coordinates, an output activation follows the decoder, and a missing positional encoding is an input
-//! map whose sine rows are zero.
+//! coordinates, an output activation follows the decoder, a missing positional encoding is an input map
+//! whose sine rows are zero, and an encoded conditioning goes into wider value maps.
 
 use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared, Outcome::Skipped};
 use burn::tensor::{Device, Gradients, Tensor, activation};
 use rand::SeedableRng;
+use std::f32::consts::TAU;
 use veni::model::{DecoderConfig, VnReluForm};
 use veni::sphere::Equirect;
-use veni::vae::decoder::{Decoder, rotate};
+use veni::vae::decoder::{Decoder, Linear, rotate};
 use veni::vae::weights::{self, Weight, Weights};
 
 /// See [`Family`](crate::Family).
@@ -31,7 +32,7 @@ pub(crate) fn unsupported(case: &Case) -> Option<String> {
     only("conditioning", &["Attention"])
         .or_else(|| only("equivariance", &["SO2"]))
         .or_else(|| only("invariant_function", &["VN"]))
-        .or_else(|| only("encoded_input", &["Directions"]))
+        .or_else(|| only("encoded_input", &["Directions", "Conditioning", "Both", "None"]))
         .or_else(|| only("positional_encoding", &["NeRF", "None"]))
         .or_else(|| only("output_activation", &["None", "sigmoid", "relu", "tanh", "exp"]))
         .or_else(|| only("axis_of_invariance", &["z", "x", "y"]))
@@ -59,23 +60,28 @@ pub(crate) struct Sizes {
     n: usize,
     hidden: usize,
     layers: usize,
+    /// Whether the directional input is encoded.
     encoded: bool,
+    /// Whether the conditioning is.
+    encoded_condition: bool,
 }
 
 impl Sizes {
     pub(crate) fn of(case: &Case) -> Self {
-        let size =
-            |key: &str| case.size(key).unwrap_or_else(|| panic!("the configuration has no size `{key}`"));
+        let size = |key: &str| case.size(key).unwrap_or_else(|| panic!("the configuration has no size `{key}`"));
+        let nerf = case.text("positional_encoding") != Some("None");
+        let input = case.text("encoded_input").unwrap_or("Directions");
         Self {
             n: size("latent_dim"),
             hidden: size("hidden_features"),
             layers: size("num_attention_layers"),
-            encoded: case.text("positional_encoding") != Some("None"),
+            encoded: nerf && ["Directions", "Both"].contains(&input),
+            encoded_condition: nerf && ["Conditioning", "Both"].contains(&input),
         }
     }
 
     fn bindings(&self) -> (Vec<Binding>, Vec<Dead>) {
-        let (h, c) = (self.hidden, 3 * self.n);
+        let (h, c) = (self.hidden, self.condition());
         let inputs = (self.n + 2) * if self.encoded { 5 } else { 1 };
         let (mut all, mut dead) = (Vec::new(), Vec::new());
         let mut put = |key: String, shape: Vec<usize>, ours: String, transposed: bool| {
@@ -112,6 +118,11 @@ impl Sizes {
         (all, dead)
     }
 
+    /// Width of what the value maps read.
+    fn condition(&self) -> usize {
+        3 * self.n * if self.encoded_condition { 5 } else { 1 }
+    }
+
     /// Rows of our input map that the authors' one has.
     fn used_rows(&self) -> std::ops::Range<usize> {
         let m = self.n + 2;
@@ -129,15 +140,18 @@ pub(crate) fn build(case: &Case, prefix: &str, device: &Device) -> Decoder {
         VnReluForm::Reference
     };
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0);
-    let decoder = Decoder::new(&config, sizes.n, &mut rng, device);
+    let mut decoder = Decoder::new(&config, sizes.n, &mut rng, device);
+    if sizes.encoded_condition {
+        for layer in &mut decoder.layers {
+            layer.value = Linear::new(sizes.condition(), sizes.hidden, &mut rng, device);
+        }
+    }
     let mut ours = weights::read(&decoder, "");
     for binding in sizes.bindings().0 {
         let key = format!("{prefix}{}", binding.key);
-        let theirs =
-            case.weight(&key, &binding.shape).unwrap_or_else(|| panic!("the case has no weight `{key}`"));
+        let theirs = case.weight(&key, &binding.shape).unwrap_or_else(|| panic!("the case has no weight `{key}`"));
         let theirs = if binding.transposed { theirs.transposed() } else { theirs };
-        let slot =
-            ours.get_mut(&binding.ours).unwrap_or_else(|| panic!("our decoder has no {}", binding.ours));
+        let slot = ours.get_mut(&binding.ours).unwrap_or_else(|| panic!("our decoder has no {}", binding.ours));
         if binding.ours == "input.weight" {
             slot.data.fill(0.0);
             let rows = sizes.used_rows();
@@ -181,6 +195,20 @@ pub(crate) fn compare_gradients(case: &Case, prefix: &str, decoder: &Decoder, gr
     }
 }
 
+/// Log radiance [B, R, 3] for latents and directions in the authors' axes, before the output activation.
+fn decode(case: &Case, decoder: &Decoder, latent: Tensor<3>, directions: Tensor<2>) -> Tensor<3> {
+    let (latent, directions) = (to_our_axis(case, latent), to_our_axis(case, directions));
+    if !Sizes::of(case).encoded_condition {
+        return decoder.forward(latent, directions);
+    }
+    let x = decoder.condition.forward(latent.clone());
+    let [batch, width] = x.dims();
+    let frequencies = Tensor::<3>::from_floats([[[1.0, 4.0]]], &x.device()) * TAU;
+    let turns = (x.clone().unsqueeze_dim::<3>(2) * frequencies).reshape([batch, 2 * width]);
+    let condition = Tensor::cat(vec![turns.clone().sin(), turns.cos(), x], 1);
+    decoder.forward_conditioned(latent, condition, directions.unsqueeze())
+}
+
 /// Coordinates so that the equivariant pair comes first and the axis last: their axis becomes our z.
 fn to_our_axis<const D: usize>(case: &Case, vectors: Tensor<D>) -> Tensor<D> {
     let order = match case.text("axis_of_invariance").unwrap_or("z") {
@@ -205,8 +233,7 @@ fn compare(case: &Case, device: &Device) -> Outcome {
     let companion = match (case.get("param.network.fc.bias"), case.config.get("filler_seed")) {
         (None, None) => {
             let note = case.text("note").unwrap_or_default();
-            let named =
-                note.split("params: see ").nth(1).map(|s| s.split([';', ' ', ',']).next().unwrap_or(s));
+            let named = note.split("params: see ").nth(1).map(|s| s.split([';', ' ', ',']).next().unwrap_or(s));
             let Some(name) = named else { return Skipped("no weights, and no note where they are".into()) };
             match case.sibling(name) {
                 Some(companion) => Some(companion),
@@ -223,14 +250,13 @@ fn compare(case: &Case, device: &Device) -> Outcome {
         Some(rotation) => rotate(latent.clone(), rotation.tensor([3, 3], device)),
         None => latent.clone(),
     };
-    let used = to_our_axis(case, used);
     let [batch, _, _] = used.dims();
     let directions = match case.get("in.directions") {
         Some(d) => d.tensor([d.values.len() / 3, 3], device),
         None => map_directions(&case.data("out.rgb").shape, device),
     };
     let rays = directions.dims()[0];
-    let raw = decoder.forward(used, to_our_axis(case, directions));
+    let raw = decode(case, &decoder, used, directions);
     let scale = ["scale_per_ray", "scale"].into_iter().find(|n| case.expects(&format!("in.{n}")));
     let scale = scale.map(|name| {
         let data = case.data(&format!("in.{name}"));
@@ -249,10 +275,7 @@ fn compare(case: &Case, device: &Device) -> Outcome {
     if let Some(probe) = case.get("probe.rgb") {
         let gradients = (rgb * probe.tensor([batch, rays, 3], device)).sum().backward();
         if case.expects("grad.in.latent") {
-            case.compare_tensor(
-                "grad.in.latent",
-                &latent.grad(&gradients).expect("a gradient of the latent"),
-            );
+            case.compare_tensor("grad.in.latent", &latent.grad(&gradients).expect("a gradient of the latent"));
         }
         if let Some((name, scale)) = &scale {
             let name = format!("grad.in.{name}");
@@ -265,8 +288,7 @@ fn compare(case: &Case, device: &Device) -> Outcome {
     for (output, input) in [("out.image", "in.latent"), ("out.ae_image", "in.ae_latent")] {
         if case.expects(output) {
             let directions = map_directions(&case.data(output).shape, device);
-            let latent = to_our_axis(case, case.tensor::<3>(input, device));
-            let image = activate(case, decoder.forward(latent, to_our_axis(case, directions)));
+            let image = activate(case, decode(case, &decoder, case.tensor(input, device), directions));
             case.compare_tensor(output, &image);
         }
     }

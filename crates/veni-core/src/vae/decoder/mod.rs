@@ -78,6 +78,16 @@ impl Decoder {
     }
 
     fn decode(&self, latent: Tensor<3>, directions: Tensor<3>) -> Tensor<3> {
+        let condition = self.condition.forward(latent.clone());
+        self.forward_conditioned(latent, condition, directions)
+    }
+
+    /// The network alone, for a conditioning vector computed by the caller: latents [B, N, 3], whatever
+    /// the layers' value maps take [B, C], directions [1 or B, R, 3] → [B, R, 3].
+    ///
+    /// # Panics
+    /// If a shape is none of these.
+    pub fn forward_conditioned(&self, latent: Tensor<3>, condition: Tensor<2>, directions: Tensor<3>) -> Tensor<3> {
         let ([_, n, three], [_, _, coordinates]) = (latent.dims(), directions.dims());
         assert!(
             n == self.latent_vectors() && three == 3 && coordinates == 3,
@@ -86,7 +96,6 @@ impl Decoder {
             latent.dims(),
             directions.dims()
         );
-        let condition = self.condition.forward(latent.clone());
         let mut attention = self.layers.iter().map(|layer| layer.attention(condition.clone()));
         let (first, rest) = self.layers.split_first().expect("a decoder has at least one layer");
         let offset = attention.next().expect("one per layer");
