@@ -1,1 +1,10 @@
-//! vae
+//! The models: the decoder (a RENI++ field), the encoder (VN-ViT), and both together.
+
+pub mod decoder;
+pub mod encoder;
+pub mod posterior;
+pub mod weights;
+
+pub use decoder::Decoder;
+pub use encoder::{Encoder, FoldedEncoder};
+pub use posterior::Posterior;
