@@ -1,1 +1,4 @@
-//! train
+//! Training: losses, schedules.
+
+pub mod loss;
+pub mod schedule;
