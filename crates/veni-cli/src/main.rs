@@ -6,8 +6,10 @@
 mod args;
 mod commands;
 mod output;
+mod picture;
 mod progress;
 mod report;
+mod sheet;
 mod size;
 mod source;
 

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use veni_core::latent::Latent;
 use veni_core::output::Overwrite;
+use veni_core::panorama::tonemap::{Curve, Tonemap};
 use veni_core::panorama::{Precision, WriteFormat, WriteOptions};
 
 use crate::args::{DecodeDevice, Force, ModelArgs};
@@ -21,6 +22,9 @@ use crate::source;
 /// The largest finite half-precision number.
 const HALF_MAX: f32 = 65504.0;
 
+/// Stands where no PNG is written.
+const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
+
 /// Bake a sky to image files
 #[derive(Args, Debug)]
 #[command(
@@ -31,8 +35,9 @@ const HALF_MAX: f32 = 65504.0;
         Formats by extension: .exr (linear, half or float), .hdr (Radiance RGBE), .png (tonemapped preview). An \
         EXR or HDR file carries its latent and the model's hash, so that it can be baked again at any size.",
     after_help = "Cube maps: six square faces stacked from top to bottom in the order +X -X +Y -Y +Z -Z of --frame, \
-        each as OpenEXR's environment cube and graphics APIs have it (the attribute veni:cubeFaces repeats the \
-        order). Default frame: blender (z up), gltf for cube maps (y up).\n\n\
+        each oriented as the layers of a cube texture in Vulkan, Direct3D, Metal, OpenGL and WebGPU; the attribute \
+        veni:cubeFaces repeats the order. With --frame bevy, z is negated before the lookup, as Bevy's shaders do. \
+        Default frame: blender (z up); gltf for cube maps (y up).\n\n\
         Examples:\n  \
         veni-cli bake --seed 7 -o sky.exr                      a random sky, 1024 x 512, half precision\n  \
         veni-cli bake --seed 7 -o sky.exr -o sky.png --size 4096\n  \
@@ -134,7 +139,7 @@ impl Bake {
         let latent = self.changed(&named);
         let started = Instant::now();
         let field = decoder.condition(&latent)?;
-        let png = self.output.iter().any(|p| WriteFormat::of(p, NEUTRAL).is_ok_and(|f| f == WriteFormat::Png(NEUTRAL)));
+        let png = self.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")));
         // the exposure of a preview is that of the sky before --exposure, which would otherwise be undone
         let tonemap = if png { preview_tonemap(&decoder.condition(&named)?) } else { NEUTRAL };
         let attributes = picture.attributes(&latent, &model.hash())?;
@@ -145,8 +150,8 @@ impl Bake {
                     *p = precision;
                 }
                 let attributes = attributes.clone();
-                let environment = picture.environment();
-                Ok((path.clone(), WriteOptions { attributes, overwrite, environment, ..WriteOptions::new(format) }))
+                let latlong = picture.is_latlong();
+                Ok((path.clone(), WriteOptions { attributes, overwrite, latlong, ..WriteOptions::new(format) }))
             };
             self.output.iter().map(file).collect()
         };
@@ -219,5 +224,17 @@ impl Bake {
             "seconds": seconds,
         });
         report.result(human, &value)
+    }
+}
+
+fn has_exr(files: &[(PathBuf, WriteOptions)]) -> bool {
+    files.iter().any(|(_, options)| matches!(options.format, WriteFormat::Exr(_)))
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(v) if v.is_finite() => Ok(v),
+        Ok(_) => Err("the number must be finite".to_owned()),
+        Err(_) => Err("not a number".to_owned()),
     }
 }

@@ -82,7 +82,7 @@ fn header(grid: Equirect, precision: Precision, factor: f32, options: &WriteOpti
     // alphabetical, as the format demands
     let channels = ["B", "G", "R"].map(|name| ChannelDescription::new(name, sample_type, false));
     let mut attributes = LayerAttributes {
-        environment_map: Some(EnvironmentMap::LatitudeLongitude),
+        environment_map: options.latlong.then_some(EnvironmentMap::LatitudeLongitude),
         software_name: Some(Text::from(SOFTWARE)),
         ..LayerAttributes::default()
     };
