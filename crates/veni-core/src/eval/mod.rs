@@ -1,1 +1,3 @@
-//! eval
+//! Evaluation: metrics between panoramas.
+
+pub mod metrics;

@@ -1,0 +1,89 @@
+//! What the network is told about the latent apart from its products with the direction.
+
+use super::linear::uniform;
+use crate::model::VnReluForm;
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor, TensorData};
+use rand::Rng;
+
+/// The Vector-Neuron invariant of each latent vector.
+///
+/// Per vector z the official network computes y = s·z_xy, q = W a₀ y, k = U a₀ y (two channels, e = 0, 1),
+/// A = VN-ReLU(q, k), and reads ⟨y, A_e⟩. Every vector in it is parallel to z_xy, so with α = W a₀,
+/// β = U a₀, t = s²|z_xy|² it has a closed form, which has no norm in it and is smooth at z_xy = 0:
+///
+/// ```text
+/// a_e = α_e t                                    where α_e β_e ≥ 0
+/// a_e = 0                                        otherwise, for the true projection
+/// a_e = α_e t (1 − m/√max(m, g)), m = β_e² t     otherwise, in the authors' form; g is their guard
+/// ```
+///
+/// It knows only |z_xy| and z_z; relative angles between latent vectors reach the network through the
+/// directional input.
+#[derive(Module, Debug)]
+pub struct Condition {
+    /// s, [1].
+    pub scale: Param<Tensor<1>>,
+    /// a₀, [1, 2].
+    pub linear: Param<Tensor<2>>,
+    /// W, [in 2, out 2].
+    pub w: Param<Tensor<2>>,
+    /// U, [in 2, out 2].
+    pub u: Param<Tensor<2>>,
+    #[module(skip)]
+    form: VnReluForm,
+}
+
+impl Condition {
+    /// Weights uniform in ±1/√inputs.
+    ///
+    /// Under [`VnReluForm::Projection`] a channel with α_e β_e < 0 is exactly 0 for every latent and gets
+    /// no gradient, so it would stay dead for ever. The sign of column e of U is therefore chosen such
+    /// that both channels start alive; U enters that form through the sign only.
+    pub fn new(form: VnReluForm, rng: &mut impl Rng, device: &Device) -> Self {
+        let mut draw = |n: usize, bound: f32| -> Vec<f32> {
+            (0..n).map(|_| rand::RngExt::random_range(rng, -bound..bound)).collect()
+        };
+        let (linear, w, mut u) = (draw(2, 1.0), draw(4, 0.5f32.sqrt()), draw(4, 0.5f32.sqrt()));
+        if form == VnReluForm::Projection {
+            for e in 0..2 {
+                let through = |m: &[f32]| linear[0] * m[e] + linear[1] * m[2 + e];
+                if through(&w) * through(&u) < 0.0 {
+                    (u[e], u[2 + e]) = (-u[e], -u[2 + e]);
+                }
+            }
+        }
+        let param = |values: Vec<f32>, shape: [usize; 2]| Param::from_data(TensorData::new(values, shape), device);
+        Self {
+            scale: uniform([1], 1.0, rng, device),
+            linear: param(linear, [1, 2]),
+            w: param(w, [2, 2]),
+            u: param(u, [2, 2]),
+            form,
+        }
+    }
+
+    /// Latents [B, N, 3] → conditioning [B, 3N]: (a_0, a_1, z_z) of each vector, one after the other.
+    pub fn forward(&self, latent: Tensor<3>) -> Tensor<2> {
+        let [batch, n, _] = latent.dims();
+        let xy = latent.clone().narrow(2, 0, 2);
+        let scale: Tensor<3> = self.scale.val().unsqueeze();
+        let t = (xy.clone() * xy).sum_dim(2) * (scale.clone() * scale);
+        let alpha: Tensor<3> = self.linear.val().matmul(self.w.val()).unsqueeze();
+        let beta: Tensor<3> = self.linear.val().matmul(self.u.val()).unsqueeze();
+        let dropped = (alpha.clone() * beta.clone()).detach().lower_elem(0.0).float();
+        let removed = match self.form {
+            VnReluForm::Projection => dropped,
+            VnReluForm::Reference => dropped * length(beta, t.clone(), 1e-6),
+            VnReluForm::ReferenceNormGuard => dropped * length(beta, t.clone(), 1e-12),
+        };
+        let a = alpha * t * (removed.neg() + 1.0);
+        Tensor::cat(vec![a, latent.narrow(2, 2, 1)], 2).reshape([batch, 3 * n])
+    }
+}
+
+/// m/√max(m, g) with m = β² t: the length |k|, guarded from below. [1, 1, 2] and [B, N, 1] → [B, N, 2].
+fn length(beta: Tensor<3>, t: Tensor<3>, guard: f64) -> Tensor<3> {
+    let m = beta.clone() * beta * t;
+    m.clone() / m.clamp_min(guard).sqrt()
+}

@@ -1,0 +1,207 @@
+//! One golden file: its metadata, its tensors, and what has been compared with it so far.
+
+use crate::compare::{self, Tolerance};
+use crate::filler;
+use burn::tensor::{Device, Tensor, TensorData};
+use serde_json::Value;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Numbers with a shape, row-major. Integers and booleans of a file are widened to f32.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Data {
+    pub(crate) shape: Vec<usize>,
+    pub(crate) values: Vec<f32>,
+}
+
+impl Data {
+    pub(crate) fn new(shape: impl Into<Vec<usize>>, values: Vec<f32>) -> Self {
+        let shape = shape.into();
+        assert_eq!(shape.iter().product::<usize>(), values.len(), "{shape:?} does not hold {}", values.len());
+        Self { shape, values }
+    }
+
+    /// A scalar (shape []).
+    pub(crate) fn scalar(value: f32) -> Self {
+        Self::new([], vec![value])
+    }
+
+    /// The values of a burn tensor, any rank.
+    pub(crate) fn of<const D: usize>(tensor: &Tensor<D>) -> Self {
+        let values = tensor.to_data().convert::<f32>().try_into_vec().expect("a float tensor");
+        Self::new(tensor.dims().to_vec(), values)
+    }
+
+    /// The same numbers as a burn tensor; the number of elements must agree, the shape may differ.
+    pub(crate) fn tensor<const D: usize>(&self, shape: [usize; D], device: &Device) -> Tensor<D> {
+        let count: usize = shape.iter().product();
+        assert_eq!(count, self.values.len(), "cannot view {:?} as {shape:?}", self.shape);
+        Tensor::from_data(TensorData::new(self.values.clone(), shape), device)
+    }
+
+    /// Rows and columns exchanged: the authors' `[out, in]` to our `[in, out]` and back.
+    pub(crate) fn transposed(&self) -> Self {
+        let [rows, columns] = self.shape[..] else {
+            panic!("transposing a tensor of shape {:?}", self.shape)
+        };
+        let values =
+            (0..columns).flat_map(|c| (0..rows).map(move |r| self.values[r * columns + c])).collect();
+        Self::new([columns, rows], values)
+    }
+}
+
+/// One case file.
+pub(crate) struct Case {
+    /// File name without extension.
+    pub(crate) name: String,
+    /// Hyper-parameters with the authors' option names.
+    pub(crate) config: Value,
+    /// The file's remark, or empty.
+    pub(crate) note: String,
+    folder: PathBuf,
+    tolerances: BTreeMap<String, Tolerance>,
+    pub(crate) tensors: BTreeMap<String, Data>,
+    compared: RefCell<BTreeSet<String>>,
+    failures: RefCell<Vec<String>>,
+}
+
+impl Case {
+    /// Reads a case file; the error names what is wrong with it.
+    pub(crate) fn load(path: &Path) -> Result<Self, String> {
+        let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+        let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).map_err(|e| e.to_string())?;
+        let file = safetensors::SafeTensors::deserialize(&bytes).map_err(|e| e.to_string())?;
+        let metadata = header.metadata().clone().unwrap_or_default();
+        let json = |key: &str| match metadata.get(key) {
+            Some(text) => serde_json::from_str(text).map_err(|e| format!("metadata `{key}`: {e}")),
+            None => Ok(Value::Null),
+        };
+        let tensors = file.iter().map(|(name, view)| Ok((name.to_owned(), widen(name, &view)?)));
+        Ok(Self {
+            name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            config: json("config")?,
+            note: metadata.get("note").cloned().unwrap_or_default(),
+            folder: path.parent().map_or_else(PathBuf::new, Path::to_path_buf),
+            tolerances: compare::tolerances(&json("tol")?)?,
+            tensors: tensors.collect::<Result<_, String>>()?,
+            compared: RefCell::default(),
+            failures: RefCell::default(),
+        })
+    }
+
+    /// Another case of the same folder, or `None` where that file is not there.
+    pub(crate) fn sibling(&self, name: &str) -> Option<Self> {
+        let path = self.folder.join(format!("{name}.safetensors"));
+        path.is_file().then(|| Self::load(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
+    }
+
+    /// `config.module`, or the empty string.
+    pub(crate) fn module(&self) -> &str {
+        self.text("module").unwrap_or_default()
+    }
+
+    /// A text option of the configuration.
+    pub(crate) fn text(&self, key: &str) -> Option<&str> {
+        self.config.get(key).and_then(Value::as_str)
+    }
+
+    /// A numeric option of the configuration.
+    pub(crate) fn number(&self, key: &str) -> Option<f64> {
+        self.config.get(key).and_then(Value::as_f64)
+    }
+
+    /// A size in the configuration.
+    pub(crate) fn size(&self, key: &str) -> Option<usize> {
+        self.config.get(key).and_then(Value::as_u64).map(|v| v as usize)
+    }
+
+    /// A tensor that may be absent.
+    pub(crate) fn get(&self, name: &str) -> Option<&Data> {
+        self.tensors.get(name)
+    }
+
+    /// A tensor that must be there.
+    pub(crate) fn data(&self, name: &str) -> &Data {
+        self.get(name).unwrap_or_else(|| panic!("the case has no tensor `{name}`"))
+    }
+
+    /// A tensor on a device, in its own shape (rank `D`).
+    pub(crate) fn tensor<const D: usize>(&self, name: &str, device: &Device) -> Tensor<D> {
+        let data = self.data(name);
+        let shape = data.shape.clone().try_into();
+        data.tensor(shape.unwrap_or_else(|s| panic!("`{name}` has shape {s:?}, not rank {D}")), device)
+    }
+
+    /// The weight with the authors' key `key`: `param.<key>`, or generated for filler cases, where the
+    /// recorded first values `check.<key>` are verified. `None` where the case has neither.
+    pub(crate) fn weight(&self, key: &str, shape: &[usize]) -> Option<Data> {
+        if let Some(data) = self.get(&format!("param.{key}")) {
+            assert_eq!(
+                data.shape, shape,
+                "`param.{key}` does not have the shape that the configuration implies"
+            );
+            return Some(data.clone());
+        }
+        let seed = self.config.get("filler_seed").and_then(Value::as_u64)?;
+        let data = Data::new(shape, filler::weight(key, shape, seed));
+        if let Some(check) = self.get(&format!("check.{key}")) {
+            assert_eq!(data.values[..check.values.len()], check.values[..], "filler weights of `{key}`");
+        }
+        Some(data)
+    }
+
+    /// Compares our numbers with the tensor `name` (`out.*`, `grad.*`), in row-major order.
+    /// The number of elements must agree; sizes of one may differ in the shape.
+    pub(crate) fn compare(&self, name: &str, ours: &Data) {
+        let golden = self.data(name);
+        self.compared.borrow_mut().insert(name.to_owned());
+        let tolerance = self.tolerances.get(name).copied().unwrap_or_else(|| Tolerance::of(golden));
+        if let Err(message) = compare::check(ours, golden, tolerance) {
+            self.failures.borrow_mut().push(format!("{name}: {message}"));
+        }
+    }
+
+    /// [`compare`](Self::compare) for a burn tensor.
+    pub(crate) fn compare_tensor<const D: usize>(&self, name: &str, ours: &Tensor<D>) {
+        self.compare(name, &Data::of(ours));
+    }
+
+    /// [`compare`](Self::compare) for one number.
+    pub(crate) fn compare_scalar(&self, name: &str, ours: f64) {
+        self.compare(name, &Data::scalar(ours as f32));
+    }
+
+    /// Whether something is to be compared under this name.
+    pub(crate) fn expects(&self, name: &str) -> bool {
+        self.tensors.contains_key(name)
+    }
+
+    /// How many tensors were compared.
+    pub(crate) fn comparisons(&self) -> usize {
+        self.compared.borrow().len()
+    }
+
+    /// What failed so far, and every output or gradient of the file that nobody compared.
+    pub(crate) fn failures(&self) -> Vec<String> {
+        let compared = self.compared.borrow();
+        let expected = |n: &&String| n.starts_with("out.") || n.starts_with("grad.");
+        let missed = self.tensors.keys().filter(expected).filter(|n| !compared.contains(*n));
+        let missed = missed.map(|n| format!("{n}: in the file, but never compared"));
+        self.failures.borrow().iter().cloned().chain(missed).collect()
+    }
+}
+
+/// Little-endian f32, i32 or u8 to f32.
+fn widen(name: &str, view: &safetensors::tensor::TensorView<'_>) -> Result<Data, String> {
+    use safetensors::Dtype;
+    let bytes = view.data();
+    let words = || bytes.as_chunks::<4>().0.iter();
+    let values: Vec<f32> = match view.dtype() {
+        Dtype::F32 => words().map(|b| f32::from_le_bytes(*b)).collect(),
+        Dtype::I32 => words().map(|b| i32::from_le_bytes(*b) as f32).collect(),
+        Dtype::U8 | Dtype::BOOL => bytes.iter().map(|&b| f32::from(b)).collect(),
+        other => return Err(format!("tensor `{name}` has type {other:?}; f32, i32 and u8 are read")),
+    };
+    Ok(Data::new(view.shape(), values))
+}
