@@ -1,6 +1,12 @@
 //! The models: the decoder (a RENI++ field), the encoder (VN-ViT), and both together.
 
 pub mod decoder;
+pub mod encoder;
+pub mod posterior;
+pub mod veni;
 pub mod weights;
 
 pub use decoder::Decoder;
+pub use encoder::{Encoder, FoldedEncoder};
+pub use posterior::Posterior;
+pub use veni::{Encoded, Veni};

@@ -1,0 +1,175 @@
+//! Named starting points: `tiny` for tests, `small` for two cores, `paper` for a graphics card.
+
+use crate::data::{AugmentConfig, DataConfig};
+use crate::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
+use crate::train::config::{DeviceKind, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig};
+use crate::train::standin::LossConfig;
+use crate::train::optimiser::AdamConfig;
+use crate::train::standin::Schedule;
+use crate::{Error, Result};
+
+/// A named configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// A model that trains a step in milliseconds: for tests and to see the machinery work.
+    Tiny,
+    /// As good as an hour on two cores can buy.
+    Small,
+    /// The paper's sizes and the authors' optimisation (REFERENCE numbers throughout).
+    Paper,
+}
+
+impl std::str::FromStr for Preset {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        match name {
+            "tiny" => Ok(Self::Tiny),
+            "small" => Ok(Self::Small),
+            "paper" => Ok(Self::Paper),
+            _ => Err(Error::invalid(format!("preset {name} is unknown: tiny, small or paper"))),
+        }
+    }
+}
+
+impl Preset {
+    /// The configuration for N latent vectors, without data folders.
+    pub fn config(self, latent_vectors: usize) -> TrainConfig {
+        match self {
+            Self::Tiny => tiny(latent_vectors),
+            Self::Small => small(latent_vectors),
+            Self::Paper => paper(latent_vectors),
+        }
+    }
+}
+
+/// Augmentation that keeps a sky a sky; chosen for a training set of some dozens.
+fn varied() -> AugmentConfig {
+    AugmentConfig {
+        turn: 1.0,
+        mirror: 0.5,
+        exposure: 0.1,
+        white_balance: 0.08,
+        contrast: 0.12,
+        polar_warp: 0.3,
+        recombine: 0.3,
+        recombine_blend: 4.0,
+        mix: 0.3,
+        mix_share: 0.5,
+    }
+}
+
+fn group(learning_rate: f64, schedule: Schedule, adam: AdamConfig) -> GroupConfig {
+    GroupConfig { learning_rate, schedule, adam }
+}
+
+fn small(latent_vectors: usize) -> TrainConfig {
+    let steps = 10_000;
+    let schedule = Schedule { warmup: 200, end: steps, floor: 0.01 };
+    let adam = AdamConfig { weight_decay: 0.01, ..AdamConfig::default() };
+    TrainConfig {
+        seed: 0,
+        steps,
+        batch: 4,
+        order: Order::Shuffle,
+        device: DeviceKind::Flex,
+        ema_decay: 0.999,
+        model: ModelConfig {
+            kind: ModelKind::Veni,
+            latent_vectors,
+            decoder: DecoderConfig::default(),
+            encoder: Some(EncoderConfig {
+                stripes: 64,
+                samples: Some(128),
+                channels: 96,
+                depth: 4,
+                heads: 6,
+                head_channels: 16,
+                ..EncoderConfig::default()
+            }),
+        },
+        data: DataConfig::default(),
+        augment: varied(),
+        loss_grid: LossGrid::Strided { factor: 2 },
+        loss: LossConfig { cosine: 1.0, scale_invariant: 1.0, mse: 1.0, mage: 0.05, kld: 0.01 },
+        decoder: group(1e-3, schedule.clone(), adam),
+        encoder: group(1e-3, schedule, adam),
+        report: ReportConfig {
+            validate_every: 250,
+            preview_every: 500,
+            checkpoint_every: 250,
+            train_subset: 8,
+            prior_copies: 4,
+            stored: Stored::F16,
+        },
+    }
+}
+
+fn tiny(latent_vectors: usize) -> TrainConfig {
+    let steps = 200;
+    let schedule = Schedule { warmup: 10, end: steps, floor: 0.05 };
+    TrainConfig {
+        steps,
+        batch: 2,
+        ema_decay: 0.9,
+        model: ModelConfig {
+            kind: ModelKind::Veni,
+            latent_vectors,
+            decoder: DecoderConfig { hidden: 16, layers: 2, heads: 4, ..DecoderConfig::default() },
+            encoder: Some(EncoderConfig {
+                stripes: 16,
+                samples: Some(32),
+                channels: 16,
+                depth: 2,
+                heads: 2,
+                head_channels: 8,
+                ..EncoderConfig::default()
+            }),
+        },
+        data: DataConfig { width: 32, height: 16, ..DataConfig::default() },
+        loss_grid: LossGrid::Full,
+        decoder: group(3e-3, schedule.clone(), AdamConfig::default()),
+        encoder: group(3e-3, schedule, AdamConfig::default()),
+        report: ReportConfig {
+            validate_every: 50,
+            preview_every: 100,
+            checkpoint_every: 50,
+            train_subset: 4,
+            prior_copies: 1,
+            stored: Stored::F16,
+        },
+        ..small(latent_vectors)
+    }
+}
+
+fn paper(latent_vectors: usize) -> TrainConfig {
+    let steps = 40_001;
+    let schedule = Schedule { warmup: 200, end: steps, floor: 0.05 };
+    TrainConfig {
+        seed: 42,
+        steps,
+        batch: 5,
+        order: Order::Replacement,
+        ema_decay: 0.0,
+        model: ModelConfig {
+            kind: ModelKind::Veni,
+            latent_vectors,
+            decoder: DecoderConfig::default(),
+            encoder: Some(EncoderConfig::default()),
+        },
+        augment: AugmentConfig { mirror: 0.5, ..AugmentConfig::default() },
+        loss_grid: LossGrid::Full,
+        loss: LossConfig { cosine: 1.0, scale_invariant: 1.0, mse: 0.0, mage: 0.5, kld: 0.01 },
+        decoder: group(1e-4, schedule.clone(), AdamConfig::default()),
+        encoder: group(1e-3, schedule, AdamConfig::default()),
+        report: ReportConfig {
+            validate_every: 1000,
+            preview_every: 1000,
+            checkpoint_every: 1000,
+            train_subset: 16,
+            prior_copies: 4,
+            stored: Stored::F16,
+        },
+        ..small(latent_vectors)
+    }
+}
