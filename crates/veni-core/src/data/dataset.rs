@@ -45,6 +45,13 @@ pub struct Item {
 }
 
 impl Item {
+    /// A clean panorama (positive and finite), resampled to `grid`, as log radiance at exposure 0.
+    pub fn new(path: &Path, panorama: &Panorama, grid: Equirect) -> Self {
+        let mut log_radiance = panorama.resample(grid).log().into_flattened();
+        let log_exposure = centre_exposure(grid, &mut log_radiance);
+        Self { path: path.to_path_buf(), log_radiance, log_exposure }
+    }
+
     /// File name without extension.
     pub fn name(&self) -> String {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
@@ -177,12 +184,5 @@ pub fn panorama_files(folder: &Path) -> Result<Vec<PathBuf>> {
 fn read_item(path: &Path, grid: Equirect) -> Result<Item> {
     let mut panorama = Panorama::read(path)?;
     panorama.sanitise().map_err(|e| e.in_file(path))?;
-    Ok(item(path, &panorama, grid))
-}
-
-/// A cleaned panorama as an item: resampled to `grid`, logarithm, exposure 0.
-pub fn item(path: &Path, panorama: &Panorama, grid: Equirect) -> Item {
-    let mut log_radiance: Vec<f32> = panorama.resample(grid).log().into_iter().flatten().collect();
-    let log_exposure = centre_exposure(grid, &mut log_radiance);
-    Item { path: path.to_path_buf(), log_radiance, log_exposure }
+    Ok(Item::new(path, &panorama, grid))
 }

@@ -9,4 +9,4 @@ pub mod exposure;
 pub mod random;
 
 pub use augment::AugmentConfig;
-pub use dataset::{DataConfig, Dataset, Item, Splits};
+pub use dataset::{DataConfig, Dataset, Item, Splits, panorama_files};

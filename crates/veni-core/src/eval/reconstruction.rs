@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::Result;
 use crate::data::Dataset;
 use crate::sphere::Equirect;
 use crate::train::standin::metrics;
@@ -49,10 +50,13 @@ impl Reconstruction {
     }
 
     /// The auto-encoder pass: each panorama decoded from the mean of its posterior.
-    pub fn autoencoder(veni: &Veni, dataset: &Dataset) -> Self {
+    ///
+    /// # Errors
+    /// As [`Veni::stripes`].
+    pub fn autoencoder(veni: &Veni, dataset: &Dataset) -> Result<Self> {
         let images: Vec<_> = dataset.items().iter().map(|i| i.log_radiance.as_slice()).collect();
-        let latents: Vec<_> = veni.encode(dataset.grid(), &images).into_iter().map(|e| e.vectors).collect();
-        Self::compare(dataset, &veni.decode(dataset.grid(), &latents))
+        let latents: Vec<_> = veni.encode(dataset.grid(), &images)?.into_iter().map(|e| e.vectors).collect();
+        Ok(Self::compare(dataset, &veni.decode(dataset.grid(), &latents)))
     }
 }
 

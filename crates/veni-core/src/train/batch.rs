@@ -2,8 +2,7 @@
 
 use crate::data::random::{Purpose, below, normal, permutation, stream, uniform};
 use crate::data::{AugmentConfig, Dataset};
-use crate::sphere::Equirect;
-use crate::train::standin::Stripes;
+use crate::sphere::{Equirect, Stripes};
 use crate::train::config::{LossGrid, Order, TrainConfig};
 
 /// The numbers of one step, row-major, channels last.
@@ -38,6 +37,7 @@ pub struct Batches<'a> {
     batch: usize,
     latent_vectors: usize,
     stripes: Stripes,
+    directions: Vec<[f32; 3]>,
 }
 
 impl<'a> Batches<'a> {
@@ -51,6 +51,7 @@ impl<'a> Batches<'a> {
             seed: config.seed,
             batch: config.batch,
             latent_vectors: config.model.latent_vectors,
+            directions: stripes.directions(),
             stripes,
         }
     }
@@ -72,8 +73,15 @@ impl<'a> Batches<'a> {
         for slot in 0..self.batch {
             let image = self.augmented(self.choice(step, slot), step, slot as u64);
             let yaw = std::f64::consts::TAU * uniform(&mut stream(self.seed, Purpose::Sampling, step, 1 + slot as u64));
-            batch.stripe_directions.extend(self.stripes.directions(yaw).into_iter().flatten());
-            batch.stripe_samples.extend(self.stripes.sample(grid, &image, yaw));
+            // the grid is turned, not the image: samples and directions lie at −yaw, in the image's own frame
+            let samples = self.stripes.gather_turned(grid, yaw).sample(image.as_chunks().0);
+            batch.stripe_samples.extend(samples.into_flattened());
+            let (sin, cos) = yaw.sin_cos();
+            let turned = |[x, y, z]: &[f32; 3]| {
+                let (x, y) = (f64::from(*x), f64::from(*y));
+                [(cos * x + sin * y) as f32, (cos * y - sin * x) as f32, *z]
+            };
+            batch.stripe_directions.extend(self.directions.iter().flat_map(turned));
             loss.extend_target(&image, &mut batch.target);
             let mut noise = stream(self.seed, Purpose::Noise, step, slot as u64);
             batch.noise.extend((0..3 * self.latent_vectors).map(|_| normal(&mut noise) as f32));

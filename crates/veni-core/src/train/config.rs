@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::{AugmentConfig, DataConfig};
 use crate::model::{ModelConfig, StoredType};
-use crate::train::standin::LossConfig;
+use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
-use crate::train::standin::Schedule;
+use crate::train::schedule::LearningRate;
 use crate::{Error, Result};
 
 /// A training run.
@@ -116,10 +116,8 @@ impl LossGrid {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GroupConfig {
-    /// Learning rate, multiplied by the schedule's factor.
-    pub learning_rate: f64,
-    /// Factor of the learning rate over the steps.
-    pub schedule: Schedule,
+    /// Learning rate over the updates; the first update is step 0.
+    pub learning_rate: LearningRate,
     /// Adam's constants.
     pub adam: AdamConfig,
 }
@@ -163,7 +161,8 @@ impl From<Stored> for StoredType {
 
 impl TrainConfig {
     /// The configuration with dotted keys replaced: each override is `key.path=value`, the value in TOML
-    /// (bare words are taken as strings).
+    /// (bare words are taken as strings). With `steps`, learning rates that fell until the old last step fall
+    /// until the new one.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the override that has no `=`, no such key, or a value of the wrong type.
@@ -175,7 +174,20 @@ impl TrainConfig {
             let mut table = toml::Table::try_from(&config).map_err(|e| broken(text, &e))?;
             let value = parse_value(value.trim());
             set(&mut table, path.trim(), value).map_err(|e| broken(text, &e))?;
+            let steps = config.steps;
             config = table.try_into().map_err(|e: toml::de::Error| broken(text, &e.message()))?;
+            if config.steps != steps {
+                for group in [&mut config.decoder, &mut config.encoder] {
+                    match &mut group.learning_rate {
+                        LearningRate::Cosine { steps: end, .. } | LearningRate::Exponential { steps: end, .. }
+                            if *end == steps =>
+                        {
+                            *end = config.steps;
+                        }
+                        _ => {}
+                    }
+                }
+            }
         }
         Ok(config)
     }
@@ -220,8 +232,8 @@ impl TrainConfig {
             return Err(Error::invalid(format!("ema_decay = {}: must lie in 0..1", self.ema_decay)));
         }
         for (name, group) in [("decoder", &self.decoder), ("encoder", &self.encoder)] {
-            if !(group.learning_rate >= 0.0 && group.learning_rate.is_finite()) {
-                let rate = group.learning_rate;
+            let ends = [0, self.steps / 2, self.steps].map(|step| group.learning_rate.at(step));
+            if let Some(rate) = ends.into_iter().find(|rate| !(*rate >= 0.0 && rate.is_finite())) {
                 return Err(Error::invalid(format!("{name}.learning_rate = {rate}: must be finite and at least 0")));
             }
         }

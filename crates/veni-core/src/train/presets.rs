@@ -3,9 +3,9 @@
 use crate::data::{AugmentConfig, DataConfig};
 use crate::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 use crate::train::config::{DeviceKind, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig};
-use crate::train::standin::LossConfig;
+use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
-use crate::train::standin::Schedule;
+use crate::train::schedule::{LearningRate, WeightSchedule};
 use crate::{Error, Result};
 
 /// A named configuration.
@@ -59,13 +59,14 @@ fn varied() -> AugmentConfig {
     }
 }
 
-fn group(learning_rate: f64, schedule: Schedule, adam: AdamConfig) -> GroupConfig {
-    GroupConfig { learning_rate, schedule, adam }
+/// Adam with a warmed-up cosine that ends at `floor` times the highest rate.
+fn group(rate: f64, [warm_up, steps]: [u64; 2], floor: f64, adam: AdamConfig) -> GroupConfig {
+    let learning_rate = LearningRate::Cosine { rate, warm_up, steps, floor, periodic: false };
+    GroupConfig { learning_rate, adam }
 }
 
 fn small(latent_vectors: usize) -> TrainConfig {
     let steps = 10_000;
-    let schedule = Schedule { warmup: 200, end: steps, floor: 0.01 };
     let adam = AdamConfig { weight_decay: 0.01, ..AdamConfig::default() };
     TrainConfig {
         seed: 0,
@@ -91,9 +92,9 @@ fn small(latent_vectors: usize) -> TrainConfig {
         data: DataConfig::default(),
         augment: varied(),
         loss_grid: LossGrid::Strided { factor: 2 },
-        loss: LossConfig { cosine: 1.0, scale_invariant: 1.0, mse: 1.0, mage: 0.05, kld: 0.01 },
-        decoder: group(1e-3, schedule.clone(), adam),
-        encoder: group(1e-3, schedule, adam),
+        loss: LossConfig { mage: WeightSchedule::Constant(0.05), ..LossConfig::default() },
+        decoder: group(1e-3, [200, steps], 0.01, adam),
+        encoder: group(1e-3, [200, steps], 0.01, adam),
         report: ReportConfig {
             validate_every: 250,
             preview_every: 500,
@@ -107,7 +108,6 @@ fn small(latent_vectors: usize) -> TrainConfig {
 
 fn tiny(latent_vectors: usize) -> TrainConfig {
     let steps = 200;
-    let schedule = Schedule { warmup: 10, end: steps, floor: 0.05 };
     TrainConfig {
         steps,
         batch: 2,
@@ -128,8 +128,8 @@ fn tiny(latent_vectors: usize) -> TrainConfig {
         },
         data: DataConfig { width: 32, height: 16, ..DataConfig::default() },
         loss_grid: LossGrid::Full,
-        decoder: group(3e-3, schedule.clone(), AdamConfig::default()),
-        encoder: group(3e-3, schedule, AdamConfig::default()),
+        decoder: group(3e-3, [10, steps], 0.05, AdamConfig::default()),
+        encoder: group(3e-3, [10, steps], 0.05, AdamConfig::default()),
         report: ReportConfig {
             validate_every: 50,
             preview_every: 100,
@@ -144,7 +144,6 @@ fn tiny(latent_vectors: usize) -> TrainConfig {
 
 fn paper(latent_vectors: usize) -> TrainConfig {
     let steps = 40_001;
-    let schedule = Schedule { warmup: 200, end: steps, floor: 0.05 };
     TrainConfig {
         seed: 42,
         steps,
@@ -159,9 +158,9 @@ fn paper(latent_vectors: usize) -> TrainConfig {
         },
         augment: AugmentConfig { mirror: 0.5, ..AugmentConfig::default() },
         loss_grid: LossGrid::Full,
-        loss: LossConfig { cosine: 1.0, scale_invariant: 1.0, mse: 0.0, mage: 0.5, kld: 0.01 },
-        decoder: group(1e-4, schedule.clone(), AdamConfig::default()),
-        encoder: group(1e-3, schedule, AdamConfig::default()),
+        loss: LossConfig::default(),
+        decoder: group(1e-4, [200, steps], 0.05, AdamConfig::default()),
+        encoder: group(1e-3, [200, steps], 0.05, AdamConfig::default()),
         report: ReportConfig {
             validate_every: 1000,
             preview_every: 1000,

@@ -13,7 +13,7 @@ pub struct StepReport {
     pub step: u64,
     /// Weighted sum of the losses.
     pub loss: f64,
-    /// Each loss part, unweighted.
+    /// Each loss part, times its weight.
     pub parts: BTreeMap<&'static str, f64>,
     /// Learning rate of each group.
     pub learning_rate: BTreeMap<&'static str, f64>,

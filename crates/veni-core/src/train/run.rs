@@ -31,6 +31,7 @@ use crate::train::batch::{Batch, Batches};
 use crate::train::checkpoint::{self, Best, CheckpointInfo};
 use crate::train::config::TrainConfig;
 use crate::train::log::MetricsLog;
+use crate::train::loss::Loss;
 use crate::train::optimiser::{Group, Optimiser};
 use crate::train::preview;
 use crate::train::progress::{Progress, StepReport, ValidationReport};
@@ -63,6 +64,7 @@ pub struct Trainer {
     /// The command line recorded in the model file.
     command: String,
     device: Device,
+    loss: Loss,
     veni: Veni,
     optimiser: Optimiser,
     best: Option<Best>,
@@ -118,8 +120,10 @@ impl Trainer {
         let groups = GROUPS.iter().zip([&config.decoder, &config.encoder]);
         let groups = groups.map(|(prefix, group)| Group { prefix: (*prefix).into(), adam: group.adam }).collect();
         let optimiser = Optimiser::new(&veni, groups, config.ema_decay)?;
+        let [height, width] = [config.data.height, config.data.width].map(|n| n / config.loss_grid.factor());
+        let loss = Loss::new(&config.loss, height, width, &device);
         let (folder, command) = (folder.to_path_buf(), command.to_owned());
-        Ok(Self { folder, config, splits, command, device, veni, optimiser, best: None })
+        Ok(Self { folder, config, splits, command, device, loss, veni, optimiser, best: None })
     }
 
     /// What defines this run.
@@ -146,7 +150,7 @@ impl Trainer {
         let (first, total) = (self.steps_done() + 1, self.config.steps);
         progress.start(first - 1, total);
         let splits = self.splits.clone();
-        let batches = Batches::new(&self.config, self.veni.stripes(), &splits.train);
+        let batches = Batches::new(&self.config, self.veni.stripes()?, &splits.train);
         let finish = std::thread::scope(|scope| {
             let (send, receive) = mpsc::sync_channel(AHEAD);
             scope.spawn(move || (first..=total).try_for_each(|step| send.send(batches.prepare(step))));
@@ -198,18 +202,18 @@ impl Trainer {
     /// One update.
     fn update(&mut self, batch: &Batch) -> Result<StepReport> {
         let clock = Instant::now();
-        let loss = batch_loss(&self.veni, batch, &self.config.loss, &self.device);
-        let value = f64::from(loss.total.clone().into_scalar::<f32>());
+        let loss = batch_loss(&self.veni, batch, &self.loss, &self.device);
+        let total = loss.terms.total();
+        let value = f64::from(total.clone().into_scalar::<f32>());
         if !value.is_finite() {
             return Err(Error::invalid(format!(
                 "the loss is {value} at update {}: lower the learning rates or the clipping norm",
                 batch.step
             )));
         }
-        let gradients = loss.total.backward();
-        // the schedule counts from 0: the authors' first update has factor 0
-        let rates = [&self.config.decoder, &self.config.encoder]
-            .map(|group| group.learning_rate * group.schedule.factor(batch.step - 1));
+        let gradients = total.backward();
+        // schedules count from 0: with a warm-up the first update has rate 0, as the authors' has
+        let rates = [&self.config.decoder, &self.config.encoder].map(|group| group.learning_rate.at(batch.step - 1));
         let (veni, groups) = self.optimiser.step(self.veni.clone(), &gradients, &rates);
         self.veni = veni;
         let seconds = clock.elapsed().as_secs_f64();
@@ -217,7 +221,7 @@ impl Trainer {
         Ok(StepReport {
             step: batch.step,
             loss: value,
-            parts: loss.parts.into_iter().map(|(name, part)| (name, f64::from(part.into_scalar::<f32>()))).collect(),
+            parts: loss.terms.terms.into_iter().map(|t| (t.name, f64::from(t.value.into_scalar::<f32>()))).collect(),
             learning_rate: by_name(&|i| groups[i].learning_rate),
             gradient_norm: by_name(&|i| groups[i].gradient_norm),
             seconds,
@@ -236,8 +240,11 @@ impl Trainer {
         let veni = self.averaged()?;
         let subset = self.config.report.train_subset.min(self.splits.train.len());
         let subset = Dataset::new(self.splits.train.grid(), self.splits.train.items()[..subset].to_vec());
-        let mean = |set: &Dataset| (!set.is_empty()).then(|| Reconstruction::autoencoder(&veni, set).mean);
-        let (val, train) = (mean(&self.splits.val), mean(&subset));
+        let mean = |set: &Dataset| match set.is_empty() {
+            true => Ok(None),
+            false => Reconstruction::autoencoder(&veni, set).map(|r| Some(r.mean)),
+        };
+        let (val, train) = (mean(&self.splits.val)?, mean(&subset)?);
         let step = self.steps_done();
         // without validation panoramas the last weights are the best known
         let best = match (val, self.best) {
@@ -280,7 +287,7 @@ impl Trainer {
 
     fn prior(&self, veni: &Veni, copies: usize) -> Result<Prior> {
         let train = &self.splits.train;
-        let batches = Batches::new(&self.config, veni.stripes(), train);
+        let batches = Batches::new(&self.config, veni.stripes()?, train);
         let (mut codes, mut variances) = (Vec::new(), Vec::new());
         for copy in 0..=copies {
             let images: Vec<_> = (train.items().iter().enumerate())
@@ -291,7 +298,7 @@ impl Trainer {
                 })
                 .collect();
             let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
-            for (encoded, item) in veni.encode(train.grid(), &views).into_iter().zip(train.items()) {
+            for (encoded, item) in veni.encode(train.grid(), &views)?.into_iter().zip(train.items()) {
                 codes.push(Latent { log_exposure: item.log_exposure, ..Latent::new(encoded.vectors) });
                 variances.extend(encoded.variances);
             }
@@ -310,7 +317,7 @@ impl Trainer {
         let items: Vec<_> = self.splits.val.items().iter().chain(self.splits.train.items()).take(PREVIEW_ROWS).collect();
         let grid = self.splits.train.grid();
         let images: Vec<_> = items.iter().map(|i| i.log_radiance.as_slice()).collect();
-        let latents: Vec<_> = veni.encode(grid, &images).into_iter().map(|e| e.vectors).collect();
+        let latents: Vec<_> = veni.encode(grid, &images)?.into_iter().map(|e| e.vectors).collect();
         let mut rng = stream(self.config.seed, Purpose::Preview, 0, 0);
         let samples: Vec<_> = items.iter().map(|_| Latent::sample(&prior, &mut rng).vectors).collect();
         let decoded = veni.decode(grid, &latents).into_iter().zip(veni.decode(grid, &samples));

@@ -3,16 +3,14 @@
 use burn::tensor::{Device, Tensor, TensorData};
 
 use crate::train::batch::Batch;
-use crate::train::standin::{LossConfig, losses};
+use crate::train::loss::{Loss, LossTerms};
 use crate::vae::{Posterior, Veni};
 
 /// The losses of one batch, on the graph.
 #[derive(Debug)]
 pub struct BatchLoss {
-    /// Weighted sum, [1].
-    pub total: Tensor<1>,
-    /// Each part, unweighted, by name.
-    pub parts: Vec<(&'static str, Tensor<1>)>,
+    /// The weighted terms.
+    pub terms: LossTerms,
     /// What the encoder said.
     pub posterior: Posterior,
     /// Decoded log radiance [B, rows, columns, 3].
@@ -22,8 +20,8 @@ pub struct BatchLoss {
 /// Encodes, samples and decodes a batch and computes its losses.
 ///
 /// # Panics
-/// If the batch was made for another configuration.
-pub fn batch_loss(veni: &Veni, batch: &Batch, config: &LossConfig, device: &Device) -> BatchLoss {
+/// If the batch or `loss` was made for another configuration.
+pub fn batch_loss(veni: &Veni, batch: &Batch, loss: &Loss, device: &Device) -> BatchLoss {
     let posterior = encode(veni, batch, device);
     let n = veni.latent_vectors();
     let noise = tensor(&batch.noise, [batch.images, n, 3], device);
@@ -33,15 +31,16 @@ pub fn batch_loss(veni: &Veni, batch: &Batch, config: &LossConfig, device: &Devi
     let shape = [batch.images, rows, columns, 3];
     let prediction = veni.decoder.forward(latent, directions).reshape(shape);
     let target = tensor(&batch.target, shape, device);
-    let (total, parts) = losses(config, prediction.clone(), target, &posterior, device);
-    BatchLoss { total, parts, posterior, prediction }
+    let gaussian = posterior.log_variance.clone().map(|l| (posterior.mean.clone(), l));
+    // schedules count from 0
+    let terms = loss.terms(batch.step - 1, prediction.clone(), target, gaussian);
+    BatchLoss { terms, posterior, prediction }
 }
 
 fn encode(veni: &Veni, batch: &Batch, device: &Device) -> Posterior {
     let config = &veni.encoder.config;
-    let samples = config.samples.unwrap_or(1);
-    let stripes = batch.stripe_samples.len() / (3 * samples * batch.images);
-    let shape = [batch.images, stripes, samples, 3];
+    let samples = batch.stripe_samples.len() / (3 * config.stripes * batch.images);
+    let shape = [batch.images, config.stripes, samples, 3];
     let directions = tensor(&batch.stripe_directions, shape, device);
     let radiance = tensor(&batch.stripe_samples, shape, device);
     veni.encoder.forward_per_image(directions, radiance)

@@ -9,8 +9,7 @@ use rand::Rng;
 use super::weights::{self, Weight, Weights};
 use super::{Decoder, Encoder};
 use crate::model::{self, Model, ModelConfig, ModelInfo};
-use crate::sphere::Equirect;
-use crate::train::standin::Stripes;
+use crate::sphere::{Equirect, Stripes};
 use crate::{Error, Result};
 
 /// Images that go through the network together outside of training; bounds the memory.
@@ -73,26 +72,32 @@ impl Veni {
         self.decoder.latent_vectors()
     }
 
-    /// Where the encoder looks.
-    pub fn stripes(&self) -> Stripes {
+    /// Where the encoder looks. Where every sample is a token, there is one meridian per stripe.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the configured numbers of stripes and samples cannot be laid out.
+    pub fn stripes(&self) -> Result<Stripes> {
         let config = &self.encoder.config;
-        Stripes::new(config.stripes, config.samples.unwrap_or(1))
+        Stripes::new(config.stripes, config.samples.unwrap_or(config.stripes / 2), config.sampling)
     }
 
     /// Encodes panoramas: log radiance at exposure 0 on `grid`, 3·W·H values each.
     ///
+    /// # Errors
+    /// As [`Veni::stripes`].
+    ///
     /// # Panics
     /// If an image has another size.
-    pub fn encode(&self, grid: Equirect, images: &[&[f32]]) -> Vec<Encoded> {
-        let stripes = self.stripes();
+    pub fn encode(&self, grid: Equirect, images: &[&[f32]]) -> Result<Vec<Encoded>> {
+        let stripes = self.stripes()?;
+        let gather = stripes.gather(grid);
         let device = self.device();
-        let config = &self.encoder.config;
-        let size = [config.stripes, config.samples.unwrap_or(1), 3];
-        let directions = stripes.directions(0.0).into_flattened();
+        let size = [stripes.stripes(), stripes.samples(), 3];
+        let directions = stripes.directions().into_flattened();
         let directions = Tensor::<3>::from_data(TensorData::new(directions, size), &device);
         let mut out = Vec::with_capacity(images.len());
         for chunk in images.chunks(CHUNK) {
-            let samples: Vec<f32> = chunk.iter().flat_map(|image| stripes.sample(grid, image, 0.0)).collect();
+            let samples: Vec<f32> = chunk.iter().flat_map(|image| gather.sample(image.as_chunks().0)).flatten().collect();
             let samples = TensorData::new(samples, [chunk.len(), size[0], size[1], 3]);
             let posterior = self.encoder.forward(directions.clone(), Tensor::from_data(samples, &device));
             let n = self.latent_vectors();
@@ -105,7 +110,7 @@ impl Veni {
                 });
             }
         }
-        out
+        Ok(out)
     }
 
     /// Decodes latents on every pixel of `grid`: log radiance at exposure 0, 3·W·H values each.

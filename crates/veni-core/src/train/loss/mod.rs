@@ -1,0 +1,195 @@
+//! The training loss: a weighted sum of terms, each with its schedule.
+//!
+//! Images are log radiance [B, H, W, 3], row 0 on top. Every term exists in two forms. The corrected one,
+//! the default, does what the paper describes and is what its name says; the reference form reproduces
+//! the authors' program number for number. Where they differ is said at each term.
+
+pub mod cosine;
+pub mod kld;
+pub mod mage;
+pub mod mse;
+pub mod rows;
+pub mod scale_invariant;
+pub mod stencil;
+#[cfg(test)]
+mod tests;
+
+use super::schedule::WeightSchedule;
+use burn::tensor::{Device, Tensor};
+use mage::MageForm;
+use mse::Space;
+use serde::{Deserialize, Serialize};
+
+/// Mathematically right, or the authors' program.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LossForm {
+    /// As described in the paper, with solid-angle weights at pixel centres.
+    #[default]
+    Corrected,
+    /// As in the authors' program.
+    Reference,
+}
+
+/// The terms and their weights. A weight that is 0 for ever costs nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LossConfig {
+    /// Which form all terms take.
+    pub form: LossForm,
+    /// Scales of MAGE.
+    pub mage_scales: usize,
+    /// Multi-scale absolute gradient error.
+    pub mage: WeightSchedule,
+    /// Scale-invariant log error.
+    pub scale_invariant: WeightSchedule,
+    /// Absolute level: squared mean log error per image. The corrected forms of the terms above and of the
+    /// cosine are all blind to a factor on the radiance; without this the decoder's level would be
+    /// arbitrary. Not in the paper, whose gradient and cosine terms fix the level by accident.
+    pub level: WeightSchedule,
+    /// Colour direction.
+    pub cosine: WeightSchedule,
+    /// Divergence of the posterior from the prior.
+    pub kld: WeightSchedule,
+    /// Mean squared error of log radiance.
+    pub log_mse: WeightSchedule,
+    /// Mean squared error of radiance.
+    pub hdr_mse: WeightSchedule,
+    /// Mean squared error of display values.
+    pub ldr_mse: WeightSchedule,
+}
+
+impl Default for LossConfig {
+    /// The paper's weights, and 1 for the level.
+    fn default() -> Self {
+        let constant = WeightSchedule::Constant;
+        Self {
+            form: LossForm::Corrected,
+            mage_scales: 2,
+            mage: constant(0.5),
+            scale_invariant: constant(1.0),
+            level: constant(1.0),
+            cosine: constant(1.0),
+            kld: constant(0.01),
+            log_mse: constant(0.0),
+            hdr_mse: constant(0.0),
+            ldr_mse: constant(0.0),
+        }
+    }
+}
+
+impl LossConfig {
+    /// The authors' program: reference forms, the paper's weights, no separate level.
+    pub fn reference() -> Self {
+        Self { form: LossForm::Reference, level: WeightSchedule::Constant(0.0), ..Self::default() }
+    }
+}
+
+/// One term, times its weight.
+#[derive(Clone, Debug)]
+pub struct Term {
+    /// The name of its weight in [`LossConfig`].
+    pub name: &'static str,
+    /// The weighted value, [1].
+    pub value: Tensor<1>,
+}
+
+/// The weighted terms that were computed.
+#[derive(Clone, Debug)]
+pub struct LossTerms {
+    /// In the order of [`LossConfig`].
+    pub terms: Vec<Term>,
+}
+
+impl LossTerms {
+    /// Their sum, [1].
+    ///
+    /// # Panics
+    /// If every weight is 0.
+    pub fn total(&self) -> Tensor<1> {
+        let values = self.terms.iter().map(|t| t.value.clone());
+        values.reduce(|a, b| a + b).expect("a loss with at least one weight that is not 0")
+    }
+
+    /// One weighted term.
+    pub fn get(&self, name: &str) -> Option<&Tensor<1>> {
+        self.terms.iter().find(|t| t.name == name).map(|t| &t.value)
+    }
+}
+
+/// The loss for one image size, with its constants ready on the device.
+#[derive(Clone, Debug)]
+pub struct Loss {
+    config: LossConfig,
+    rows: Tensor<4>,
+    mage: Option<MageForm>,
+}
+
+impl Loss {
+    /// For images of `height` × `width`.
+    ///
+    /// # Panics
+    /// If MAGE is on and the image is smaller than three pixels at its coarsest scale.
+    pub fn new(config: &LossConfig, height: usize, width: usize, device: &Device) -> Self {
+        let rows = match config.form {
+            LossForm::Corrected => rows::solid_angle(height, device),
+            LossForm::Reference => rows::reference(height, device),
+        };
+        let mage = (!config.mage.is_off())
+            .then(|| MageForm::new(config.form, config.mage_scales, height, width, device));
+        Self { config: config.clone(), rows, mage }
+    }
+
+    /// All terms whose weight in `step` is not 0. Images [B, H, W, 3]; `posterior` is the encoder's
+    /// (mean [B, N, 3], log variance [B, N, 1]), absent for an auto-decoder or in evaluation.
+    pub fn terms(
+        &self,
+        step: u64,
+        prediction: Tensor<4>,
+        target: Tensor<4>,
+        posterior: Option<(Tensor<3>, Tensor<3>)>,
+    ) -> LossTerms {
+        let (config, form) = (&self.config, self.config.form);
+        let images = || (prediction.clone(), target.clone(), self.rows.clone());
+        let error = |space: Space| {
+            let (p, i, rows) = images();
+            mse::mse(form, space, p, i, rows, None)
+        };
+        let mut terms = Vec::new();
+        let mut put = |name: &'static str, schedule: &WeightSchedule, value: &dyn Fn() -> Tensor<1>| {
+            let weight = schedule.at(step);
+            if weight != 0.0 {
+                terms.push(Term { name, value: value() * weight });
+            }
+        };
+        if let Some(mage) = &self.mage {
+            put("mage", &config.mage, &|| mage.loss(prediction.clone(), target.clone()));
+        }
+        put("scale_invariant", &config.scale_invariant, &|| {
+            let (p, i, rows) = images();
+            match form {
+                LossForm::Corrected => scale_invariant::scale_invariant(p, i, rows),
+                LossForm::Reference => scale_invariant::reference(p, i, rows).mean(),
+            }
+        });
+        put("level", &config.level, &|| {
+            let (p, i, _) = images();
+            let weights = rows::solid_angle(p.dims()[1], &p.device());
+            scale_invariant::level(p, i, weights)
+        });
+        put("cosine", &config.cosine, &|| {
+            let (p, i, rows) = images();
+            match form {
+                LossForm::Corrected => cosine::chromaticity(p, i, rows),
+                LossForm::Reference => cosine::reference(p, i, rows),
+            }
+        });
+        if let Some((mean, log_variance)) = &posterior {
+            put("kld", &config.kld, &|| kld::isotropic(mean.clone(), log_variance.clone()).mean());
+        }
+        put("log_mse", &config.log_mse, &|| error(Space::Log));
+        put("hdr_mse", &config.hdr_mse, &|| error(Space::Hdr));
+        put("ldr_mse", &config.ldr_mse, &|| error(Space::Ldr));
+        LossTerms { terms }
+    }
+}
