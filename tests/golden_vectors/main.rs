@@ -20,6 +20,7 @@ mod report;
 mod schedules;
 mod self_test;
 mod training;
+mod vectors;
 
 use burn::tensor::Device;
 use case::Case;

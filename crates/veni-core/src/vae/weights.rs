@@ -1,6 +1,7 @@
 //! Any burn module's parameters as named plain numbers, and back: the bridge to the model file.
 //!
-//! Names are the dotted paths of the fields, e.g. `decoder.layers.0.ff1.weight`.
+//! Names are the dotted paths of the fields, e.g. `decoder.layers.0.ff1.weight`. Where a field holds one of
+//! several kinds of layer (an enum), the kind adds no component: the configuration tells it.
 
 use crate::{Error, Result};
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
@@ -42,7 +43,8 @@ pub fn write<M: Module>(module: M, prefix: &str, weights: &Weights) -> Result<M>
     if let Some(error) = writer.error {
         return Err(error);
     }
-    let inside = |name: &&String| prefix.is_empty() || name.strip_prefix(prefix).is_some_and(|r| r.starts_with('.'));
+    let inside =
+        |name: &&String| prefix.is_empty() || name.strip_prefix(prefix).is_some_and(|r| r.starts_with('.'));
     if weights.keys().filter(inside).count() != writer.used {
         let known = read(&module, prefix);
         let unknown = weights.keys().filter(inside).find(|name| !known.contains_key(*name));
@@ -60,6 +62,18 @@ struct Path(Vec<String>);
 impl Path {
     fn new(prefix: &str) -> Self {
         Self(prefix.split('.').filter(|s| !s.is_empty()).map(str::to_owned).collect())
+    }
+
+    fn enter(&mut self, name: &str, container_type: &str) {
+        if !container_type.starts_with("Enum:") {
+            self.0.push(name.to_owned());
+        }
+    }
+
+    fn exit(&mut self, container_type: &str) {
+        if !container_type.starts_with("Enum:") {
+            self.0.pop();
+        }
     }
 
     fn dotted(&self) -> String {
@@ -80,12 +94,12 @@ fn collect<M: Module>(module: &M, prefix: &str, gradients: Option<&Gradients>) -
 }
 
 impl ModuleVisitor for Reader<'_> {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.0.push(name.to_owned());
+    fn enter_module(&mut self, name: &str, container_type: &str) {
+        self.path.enter(name, container_type);
     }
 
-    fn exit_module(&mut self, _name: &str, _container_type: &str) {
-        self.path.0.pop();
+    fn exit_module(&mut self, _name: &str, container_type: &str) {
+        self.path.exit(container_type);
     }
 
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
@@ -109,12 +123,12 @@ struct Writer<'a> {
 }
 
 impl ModuleMapper for Writer<'_> {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.0.push(name.to_owned());
+    fn enter_module(&mut self, name: &str, container_type: &str) {
+        self.path.enter(name, container_type);
     }
 
-    fn exit_module(&mut self, _name: &str, _container_type: &str) {
-        self.path.0.pop();
+    fn exit_module(&mut self, _name: &str, container_type: &str) {
+        self.path.exit(container_type);
     }
 
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
@@ -122,7 +136,9 @@ impl ModuleMapper for Writer<'_> {
         let shape = param.shape().as_slice().to_vec();
         let problem = match self.weights.get(&name) {
             None => format!("tensor {name} {shape:?} is missing"),
-            Some(w) if w.shape != shape => format!("tensor {name} has shape {:?}; the model needs {shape:?}", w.shape),
+            Some(w) if w.shape != shape => {
+                format!("tensor {name} has shape {:?}; the model needs {shape:?}", w.shape)
+            }
             Some(w) if w.data.len() != shape.iter().product::<usize>() => {
                 format!("tensor {name} {shape:?} holds {} values", w.data.len())
             }

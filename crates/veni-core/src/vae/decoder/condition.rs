@@ -53,7 +53,8 @@ impl Condition {
                 }
             }
         }
-        let param = |values: Vec<f32>, shape: [usize; 2]| Param::from_data(TensorData::new(values, shape), device);
+        let param =
+            |values: Vec<f32>, shape: [usize; 2]| Param::from_data(TensorData::new(values, shape), device);
         Self {
             scale: uniform([1], 1.0, rng, device),
             linear: param(linear, [1, 2]),

@@ -17,7 +17,10 @@ impl Linear {
     /// Weight and bias uniform in ±1/√inputs.
     pub fn new(inputs: usize, outputs: usize, rng: &mut impl Rng, device: &Device) -> Self {
         let bound = 1.0 / (inputs as f32).sqrt();
-        Self { weight: uniform([inputs, outputs], bound, rng, device), bias: uniform([outputs], bound, rng, device) }
+        Self {
+            weight: uniform([inputs, outputs], bound, rng, device),
+            bias: uniform([outputs], bound, rng, device),
+        }
     }
 
     /// [..., in] → [..., out].
