@@ -22,29 +22,39 @@ pub(crate) const CUBE_FACES: &str = "veni:cubeFaces";
 /// Refuses, before any work, what could not be written after it: a file that exists, a name without one of
 /// `extensions`, a folder that is missing or cannot be written to, a name given twice.
 pub(crate) fn check(paths: &[PathBuf], extensions: &[&str], overwrite: Overwrite) -> Result<()> {
-    for (at, path) in paths.iter().enumerate() {
+    check_distinct(paths)?;
+    for path in paths {
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         if !extension.as_deref().is_some_and(|e| extensions.contains(&e)) {
             bail!("{}: the name must end in .{}", path.display(), extensions.join(" or ."));
-        }
-        if paths[..at].contains(path) {
-            bail!("{}: named twice as an output; leave one out", path.display());
         }
         if path.is_dir() {
             bail!("{}: is a folder; name a file in it", path.display());
         }
         refuse_existing(path, overwrite)?;
-        let folder = match path.parent() {
-            Some(p) if !p.as_os_str().is_empty() => p,
-            _ => Path::new("."),
-        };
-        writable(folder, path)?;
+        writable(folder_of(path), path)?;
     }
     Ok(())
 }
 
+/// The folder that holds `path`.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    }
+}
+
+/// Refuses two outputs of one name.
+pub(crate) fn check_distinct(paths: &[PathBuf]) -> Result<()> {
+    match paths.iter().enumerate().find(|(at, path)| paths[..*at].contains(path)) {
+        Some((_, path)) => bail!("{}: would be written twice; leave one out or rename it", path.display()),
+        None => Ok(()),
+    }
+}
+
 /// Creates and removes an empty file: permissions alone do not say whether a file system is writable.
-fn writable(folder: &Path, wanted: &Path) -> Result<()> {
+pub(crate) fn writable(folder: &Path, wanted: &Path) -> Result<()> {
     match folder.metadata() {
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
             bail!("{}: there is no folder {}; create it first", wanted.display(), folder.display())

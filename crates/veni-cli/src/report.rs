@@ -61,6 +61,13 @@ pub(crate) fn error(error: &anyhow::Error) {
     to_stderr(&format!("veni-cli: {}\n", one_line(&format!("{error:#}"))));
 }
 
+/// Ends a command that went on after errors: the last one is for `main` to print, the others are printed here.
+pub(crate) fn last_of(mut errors: Vec<anyhow::Error>) -> anyhow::Result<Outcome> {
+    let last = errors.pop();
+    errors.iter().for_each(error);
+    last.map_or(Ok(Outcome::Fine), Err)
+}
+
 fn one_line(text: &str) -> String {
     text.lines().map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ")
 }

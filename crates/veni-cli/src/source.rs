@@ -13,12 +13,19 @@ use crate::args::ModelArgs;
 use crate::output::{CUBE_FACES, LATENT};
 use crate::report::Report;
 
+/// A model and what to call it in messages.
+pub(crate) struct Loaded {
+    pub(crate) model: Model,
+    pub(crate) name: String,
+}
+
 /// The model of `--model`: a file, the folder of a training run, or the one inside the program.
-pub(crate) fn model(args: &ModelArgs) -> Result<Model> {
-    match &args.model {
-        Some(path) => Ok(Model::load(model_file(path)?)?),
-        None => embedded(),
-    }
+pub(crate) fn model(args: &ModelArgs) -> Result<Loaded> {
+    let Some(path) = &args.model else {
+        return Ok(Loaded { model: embedded()?, name: "the model inside this program".into() });
+    };
+    let path = model_file(path)?;
+    Ok(Loaded { model: Model::load(&path)?, name: path.display().to_string() })
 }
 
 #[cfg(feature = "pretrained")]
@@ -49,7 +56,8 @@ pub(crate) fn seeded(model: &Model, seed: u64) -> Latent {
 }
 
 /// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder.
-pub(crate) fn from_file(path: &Path, model: &Model, report: Report) -> Result<Latent> {
+pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
+    let model = &loaded.model;
     let mut latent = match content(path)? {
         Content::Latent => Latent::load(path)?,
         Content::Image => {
@@ -61,7 +69,7 @@ pub(crate) fn from_file(path: &Path, model: &Model, report: Report) -> Result<La
                 None if attributes.contains_key(CUBE_FACES) => {
                     bail!("{}: a cube map cannot be encoded; name an equirectangular panorama", path.display())
                 }
-                None => encode(path, model, report)?,
+                None => encode(path, loaded, report)?,
             }
         }
     };
@@ -89,13 +97,13 @@ fn check(latent: &Latent, model: &Model) -> Result<()> {
 }
 
 #[cfg(feature = "learn")]
-fn encode(path: &Path, model: &Model, report: Report) -> Result<Latent> {
+fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
     report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
-    crate::commands::encode::Encoding::new(model)?.encode_file(path, report).map(|e| e.latent)
+    crate::commands::encode::Encoding::new(loaded)?.encode_file(path, report).map(|e| e.latent)
 }
 
 #[cfg(not(feature = "learn"))]
-fn encode(path: &Path, _: &Model, _: Report) -> Result<Latent> {
+fn encode(path: &Path, _: &Loaded, _: Report) -> Result<Latent> {
     bail!("{}: no latent inside, and this build cannot encode panoramas (it lacks the feature `learn`)", path.display())
 }
 

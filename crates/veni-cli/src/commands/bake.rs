@@ -127,13 +127,14 @@ impl Bake {
         let overwrite = Overwrite::from(self.force);
         output::check(&self.output, &["exr", "hdr", "png"], overwrite)?;
         let picture = Picture::new(self.layout, self.frame, self.size)?;
-        let model = source::model(&self.model)?;
+        let loaded = source::model(&self.model)?;
+        let model = &loaded.model;
         let decoder = match self.device {
             DecodeDevice::Auto | DecodeDevice::Cpu => model.decoder(),
         };
         let named = match (&self.latent, self.seed) {
-            (Some(path), _) => source::from_file(path, &model, report)?,
-            (None, Some(seed)) => source::seeded(&model, seed),
+            (Some(path), _) => source::from_file(path, &loaded, report)?,
+            (None, Some(seed)) => source::seeded(model, seed),
             (None, None) => bail!("name a latent or give --seed"),
         };
         let latent = self.changed(&named);

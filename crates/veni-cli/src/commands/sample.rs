@@ -18,7 +18,7 @@ use crate::progress::Progress;
 use crate::report::{Outcome, Report};
 use crate::sheet::Sheet;
 use crate::size::Size;
-use crate::source;
+use crate::source::{self, Loaded};
 
 /// More skies than anyone looks at.
 const MAX_CELLS: usize = 10_000;
@@ -111,7 +111,7 @@ impl Sample {
             bail!("--seed {}: leaves no room for {count} seeds; give a smaller one", self.seed);
         };
         let files = self.latent_files(last, overwrite)?;
-        let model = source::model(&self.model)?;
+        let Loaded { model, .. } = source::model(&self.model)?;
         let decoder = match self.device {
             DecodeDevice::Auto | DecodeDevice::Cpu => model.decoder(),
         };

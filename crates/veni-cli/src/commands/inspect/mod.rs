@@ -3,7 +3,7 @@
 mod image;
 mod latent;
 mod model;
-mod run;
+pub(crate) mod run;
 mod statistics;
 
 use std::fmt::Write as _;
@@ -47,10 +47,7 @@ impl Inspect {
                 Err(error) => failed.push(error),
             }
         }
-        // the others are shown first; the last error is reported by `main`
-        let last = failed.pop();
-        failed.iter().for_each(report::error);
-        last.map_or(Ok(Outcome::Fine), Err)
+        report::last_of(failed)
     }
 }
 

@@ -22,19 +22,21 @@ pub(super) fn describe(folder: &Path) -> Result<Facts> {
     let config_text = fs::read_to_string(&config).map_err(|e| Error::io(&config, "read", e))?;
     let mut facts = Facts::new("training run");
     let lines = if metrics.is_file() { read_lines(&metrics)? } else { Vec::new() };
-    let last = lines.iter().rev().find_map(|l| Some((l.get("step")?.as_u64()?, l)));
-    match last {
-        Some((step, line)) => {
-            facts.add("step", step.to_string(), step);
-            facts.add("last line", line.to_string(), line.clone());
+    let steps = steps_of(&config_text);
+    match lines.iter().rev().find(|line| line.get("loss").is_some()) {
+        Some(line) => {
+            let step = line["step"].as_u64().unwrap_or(0);
+            let of = steps.map(|n| format!(" of {n}")).unwrap_or_default();
+            facts.add("step", format!("{step}{of}"), step);
+            facts.add("loss", format!("{:.4}", line["loss"].as_f64().unwrap_or(f64::NAN)), line["loss"].clone());
         }
         None => facts.add("step", "0 (not begun)", 0),
     }
-    if let Some((name, best, step)) = best_validation(&lines) {
+    if let Some(Best { step, ldr_psnr }) = best_of(&lines) {
         facts.add(
             "best validation",
-            format!("{name} {best:.4} at step {step}"),
-            serde_json::json!({ "metric": name, "value": best, "step": step }),
+            format!("LDR PSNR {ldr_psnr:.2} dB at step {step}"),
+            serde_json::json!({ "ldr_psnr": ldr_psnr, "step": step }),
         );
     }
     for (name, file) in [("model", "model.safetensors"), ("checkpoint", "checkpoint"), ("previews", "preview")] {
@@ -61,18 +63,29 @@ fn read_lines(path: &Path) -> Result<Vec<Value>> {
     Ok(values)
 }
 
-/// The best validation PSNR: name, value, step.
-fn best_validation(lines: &[Value]) -> Option<(String, f64, u64)> {
-    let mut best: Option<(String, f64, u64)> = None;
-    for line in lines {
-        let Some((step, object)) = line.get("step").and_then(Value::as_u64).zip(line.as_object()) else { continue };
-        for (name, value) in object.iter().filter(|(name, _)| name.starts_with("val") && name.contains("psnr")) {
-            if let Some(value) = value.as_f64()
-                && best.as_ref().is_none_or(|(_, b, _)| value > *b)
-            {
-                best = Some((name.clone(), value, step));
-            }
-        }
-    }
-    best
+/// The best validation of a run.
+pub(crate) struct Best {
+    pub(crate) step: u64,
+    pub(crate) ldr_psnr: f64,
+}
+
+/// The best validation that a run's folder records.
+#[cfg(feature = "learn")]
+pub(crate) fn best(folder: &Path) -> Result<Option<Best>> {
+    read_lines(&folder.join(METRICS)).map(|lines| best_of(&lines))
+}
+
+fn best_of(lines: &[Value]) -> Option<Best> {
+    let validations = lines.iter().filter_map(|line| {
+        let ldr_psnr = line.pointer("/validation/val/ldr_psnr")?.as_f64()?;
+        Some(Best { step: line.get("step")?.as_u64()?, ldr_psnr })
+    });
+    validations.max_by(|a, b| a.ldr_psnr.total_cmp(&b.ldr_psnr))
+}
+
+/// The top-level `steps` of a configuration: nothing else of TOML is needed here.
+fn steps_of(config: &str) -> Option<u64> {
+    let top = config.lines().take_while(|line| !line.trim_start().starts_with('['));
+    let mut values = top.filter_map(|line| line.split_once('=').filter(|(key, _)| key.trim() == "steps"));
+    values.next()?.1.trim().parse().ok()
 }
