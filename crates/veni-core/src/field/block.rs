@@ -75,9 +75,9 @@ fn scatter<S: Simd>(simd: S, directions: &[[f32; 3]], rows: &mut [Row<S>]) {
             flat[k * lanes + i] = *value;
         }
     }
-    for v in 0..VECTORS {
-        let (x, y) = (rows[0][v], rows[1][v]);
-        rows[3][v] = simd.sqrt_f32s(simd.mul_add_f32s(x, x, simd.mul_f32s(y, y)));
+    let [xs, ys, _, radii] = rows else { unreachable!("a direction is four rows") };
+    for ((radius, x), y) in radii.iter_mut().zip(xs).zip(ys) {
+        *radius = simd.sqrt_f32s(simd.mul_add_f32s(*x, *x, simd.mul_f32s(*y, *y)));
     }
 }
 

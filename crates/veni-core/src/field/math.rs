@@ -7,7 +7,7 @@ const ROUND: f32 = 12_582_912.0;
 
 /// sin 2πu = u·Σ Sᵢ u²ⁱ and cos 2πu = 1 + u² Σ Cᵢ u²ⁱ on |u| ≤ 1/8.
 /// (interpolated at Chebyshev nodes; the polynomials' own error is below 3e-9).
-const SIN: [f32; 4] = [6.283_185_3, -41.341_663, 81.592_54, -75.401_61];
+const SIN: [f32; 4] = [std::f32::consts::TAU, -41.341_663, 81.592_54, -75.401_61];
 const COS: [f32; 4] = [-19.739_208, 64.939_37, -85.448_82, 59.424_107];
 
 /// t − round(t), for |t| < 2²².
