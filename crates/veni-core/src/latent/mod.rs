@@ -1,1 +1,188 @@
-//! latent
+//! The latent code: N vectors in R³ that turn with the scene, and an exposure.
+//!
+//! Turning a panorama by α about z turns every vector by α about z; the x and y of a vector form its
+//! equivariant part, z its invariant part. The paper's dimension is D = 3N.
+
+mod file;
+mod normal;
+mod prior;
+
+pub use file::MAX_LATENT_BYTES;
+pub use prior::Prior;
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::{Error, Result};
+
+/// A code for one panorama, in the native frame (z up).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Latent {
+    /// The N vectors [x, y, z].
+    pub vectors: Vec<[f32; 3]>,
+    /// Natural log of the factor between the decoder's output and radiance; added to log radiance. 0 leaves it.
+    pub log_exposure: f32,
+    /// Identity of the decoder it was made for ([`Model::hash`](crate::model::Model::hash)), if known.
+    pub model: Option<String>,
+    /// What it was made from, in words, if known.
+    pub source: Option<String>,
+}
+
+impl Latent {
+    /// A code at exposure 0, of unknown origin.
+    pub fn new(vectors: Vec<[f32; 3]>) -> Self {
+        Self { vectors, ..Self::default() }
+    }
+
+    /// A random code: vectors and exposure drawn from `prior`. The same generator state gives the same bits
+    /// on every machine.
+    pub fn sample<R: Rng + ?Sized>(prior: &Prior, rng: &mut R) -> Self {
+        prior.sample(rng)
+    }
+
+    /// A random code named by a number: [`Latent::sample`] with ChaCha8 seeded by it.
+    pub fn from_seed(prior: &Prior, seed: u64) -> Self {
+        let source = Some(format!("seed {seed}"));
+        Self { source, ..prior.sample(&mut ChaCha8Rng::seed_from_u64(seed)) }
+    }
+
+    /// The code of the same scene turned by `radians` about z, counter-clockwise seen from above.
+    #[must_use]
+    pub fn turned(&self, radians: f64) -> Self {
+        let (sin, cos) = radians.sin_cos();
+        self.map(|[x, y, z]| {
+            let (x, y) = (f64::from(x), f64::from(y));
+            [(x * cos - y * sin) as f32, (x * sin + y * cos) as f32, z]
+        })
+    }
+
+    /// The code of the mirrored scene: azimuth φ becomes −φ, the columns of a panorama reversed.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        self.map(|[x, y, z]| [x, -y, z])
+    }
+
+    fn map(&self, change: impl Fn([f32; 3]) -> [f32; 3]) -> Self {
+        Self { vectors: self.vectors.iter().copied().map(change).collect(), ..self.clone() }
+    }
+
+    /// (1 − t)·self + t·other, vector by vector, exposure too: the paper's interpolation.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the codes have different N or belong to different models.
+    pub fn lerp(&self, other: &Self, t: f32) -> Result<Self> {
+        self.blend(other, t, 1.0 - t, t)
+    }
+
+    /// Interpolation along the great circle of the 3N-dimensional codes: unlike [`Latent::lerp`] it passes
+    /// through codes of typical length, which keeps contrast midway. Nearly parallel or zero codes are
+    /// interpolated linearly. The exposure is interpolated linearly.
+    ///
+    /// # Errors
+    /// As [`Latent::lerp`].
+    pub fn slerp(&self, other: &Self, t: f32) -> Result<Self> {
+        let dot = |a: &Self, b: &Self| -> f64 {
+            let pairs = a.vectors.as_flattened().iter().zip(b.vectors.as_flattened());
+            pairs.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+        };
+        let cosine = dot(self, other) / (dot(self, self) * dot(other, other)).sqrt();
+        let angle = cosine.clamp(-1.0, 1.0).acos();
+        let t64 = f64::from(t);
+        // opposite codes have no unique great circle, parallel ones none at all (NaN: a zero code)
+        if !(1e-6..=std::f64::consts::PI - 1e-6).contains(&angle) {
+            return self.lerp(other, t);
+        }
+        let (a, b) = (((1.0 - t64) * angle).sin() / angle.sin(), (t64 * angle).sin() / angle.sin());
+        self.blend(other, t, a as f32, b as f32)
+    }
+
+    fn blend(&self, other: &Self, t: f32, a: f32, b: f32) -> Result<Self> {
+        let (n, m) = (self.vectors.len(), other.vectors.len());
+        if n != m {
+            return Err(Error::invalid(format!("cannot interpolate codes of {n} and {m} vectors")));
+        }
+        if let (Some(one), Some(two)) = (&self.model, &other.model)
+            && one != two
+        {
+            return Err(Error::invalid(format!(
+                "cannot interpolate codes of different models ({one} and {two})"
+            )));
+        }
+        let pairs = self.vectors.iter().zip(&other.vectors);
+        Ok(Self {
+            vectors: pairs.map(|(p, q)| std::array::from_fn(|k| a * p[k] + b * q[k])).collect(),
+            log_exposure: (1.0 - t) * self.log_exposure + t * other.log_exposure,
+            model: self.model.clone().or_else(|| other.model.clone()),
+            source: None,
+        })
+    }
+
+    /// Refuses a NaN or an infinity.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the first vector or exposure that is not finite.
+    pub fn check_finite(&self) -> Result<()> {
+        if let Some(i) = self.vectors.iter().position(|v| v.iter().any(|c| !c.is_finite())) {
+            return Err(Error::invalid(format!("latent vector {i} is {:?}, not finite", self.vectors[i])));
+        }
+        if !self.log_exposure.is_finite() {
+            return Err(Error::invalid(format!(
+                "the latent's exposure is {}, not finite",
+                self.log_exposure
+            )));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn random(n: usize, seed: u64) -> Latent {
+        Latent::from_seed(&Prior::standard(n), seed)
+    }
+
+    #[test]
+    fn turns_add_up_and_mirroring_reverses_them() {
+        let latent = random(9, 1);
+        let close = |a: &Latent, b: &Latent| {
+            let pairs = a.vectors.as_flattened().iter().zip(b.vectors.as_flattened());
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) < 1e-6
+        };
+        assert!(close(&latent.turned(0.3).turned(0.5), &latent.turned(0.8)));
+        assert!(close(&latent.turned(0.7).mirrored(), &latent.mirrored().turned(-0.7)));
+        assert!(!close(&latent.turned(0.7).mirrored(), &latent.mirrored().turned(0.7)));
+        assert_eq!(latent.mirrored().mirrored(), latent);
+    }
+
+    #[test]
+    fn interpolation_hits_its_ends_and_refuses_strangers() {
+        let (mut a, mut b) = (random(9, 1), random(9, 2));
+        (a.log_exposure, b.log_exposure) = (1.0, 3.0);
+        assert_eq!(a.lerp(&b, 0.0).unwrap().vectors, a.vectors);
+        assert_eq!(a.lerp(&b, 1.0).unwrap().vectors, b.vectors);
+        assert_eq!(a.lerp(&b, 0.5).unwrap().log_exposure, 2.0);
+        let length = |l: &Latent| l.vectors.as_flattened().iter().map(|v| v * v).sum::<f32>().sqrt();
+        let (lerp, slerp) = (a.lerp(&b, 0.5).unwrap(), a.slerp(&b, 0.5).unwrap());
+        assert!(length(&slerp) > 1.1 * length(&lerp));
+        assert_eq!(
+            Latent::new(vec![[0.0; 3]; 9]).slerp(&a, 0.5).unwrap().vectors[0][0],
+            0.5 * a.vectors[0][0]
+        );
+        assert!(a.lerp(&random(8, 1), 0.5).is_err());
+        (a.model, b.model) = (Some("one".into()), Some("two".into()));
+        assert!(a.lerp(&b, 0.5).unwrap_err().to_string().contains("different models"));
+    }
+
+    #[test]
+    fn non_finite_codes_are_found() {
+        let mut latent = random(9, 1);
+        latent.check_finite().unwrap();
+        latent.vectors[4][2] = f32::NAN;
+        assert!(latent.check_finite().unwrap_err().to_string().contains("vector 4"));
+        latent.vectors[4][2] = 0.0;
+        latent.log_exposure = f32::INFINITY;
+        assert!(latent.check_finite().is_err());
+    }
+}

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::{Error, Result};
+
 /// Everything needed to build a model's modules and to check its weight file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -16,6 +18,40 @@ pub struct ModelConfig {
     /// The VN-ViT; absent in a decode-only model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub encoder: Option<EncoderConfig>,
+}
+
+impl ModelConfig {
+    /// The paper's decoder for N latent vectors, without an encoder.
+    pub fn decode_only(latent_vectors: usize) -> Self {
+        Self { kind: ModelKind::Veni, latent_vectors, decoder: DecoderConfig::default(), encoder: None }
+    }
+
+    /// Checks every size: positive, and small enough that products of sizes stay far from overflow.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field, its value and what is allowed.
+    pub fn validate(&self) -> Result<()> {
+        let DecoderConfig { hidden, layers, heads, vn_relu: _ } = self.decoder;
+        within("latent_vectors", self.latent_vectors, 4096)?;
+        within("decoder.hidden", hidden, 8192)?;
+        within("decoder.layers", layers, 256)?;
+        within("decoder.heads", heads, hidden)?;
+        let Some(encoder) = &self.encoder else { return Ok(()) };
+        within("encoder.stripes", encoder.stripes, 1 << 16)?;
+        within("encoder.samples", encoder.samples.unwrap_or(1), 1 << 20)?;
+        within("encoder.channels", encoder.channels, 8192)?;
+        within("encoder.depth", encoder.depth, 256)?;
+        within("encoder.heads", encoder.heads, 1024)?;
+        within("encoder.head_channels", encoder.head_channels, 1024)?;
+        within("encoder.feedforward", encoder.feedforward, 64)
+    }
+}
+
+fn within(name: &str, value: usize, most: usize) -> Result<()> {
+    if (1..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("{name} = {value} is not between 1 and {most}")))
 }
 
 /// Which system the weights belong to.

@@ -7,7 +7,24 @@
 //!   centre of the image looks along +x, image right is −y (as in Blender; after the usual change from z up
 //!   to y up also as in glTF).
 //! - Angles are radians unless a name says degrees. Directions are unit `[f32; 3]`, colours linear `[f32; 3]`.
+//!
+//! | here | what |
+//! |---|---|
+//! | [`Equirect`] | the pixel grid of a panorama, solid angles |
+//! | [`Frame`] | directions of Blender, glTF, OpenEXR/USD, Bevy |
+//! | [`CubeFace`] | cube maps: texel directions and solid angles |
+//! | [`Stripes`], [`Gather`] | where the encoder looks, and fast lookup there |
+//! | [`reference`] | the samplers of the authors' program, for their weights and numbers |
 
+mod cube;
 mod equirect;
+mod frame;
+mod gather;
+pub mod reference;
+mod stripes;
 
+pub use cube::CubeFace;
 pub use equirect::Equirect;
+pub use frame::Frame;
+pub use gather::Gather;
+pub use stripes::Stripes;

@@ -1,0 +1,252 @@
+//! The network for a block of directions at a time.
+//!
+//! A block is three vectors of lanes, one direction per lane. Activations are feature-major: one [`Row`] (three
+//! vectors) per feature, so that layer norm, encoding and ReLU are plain vector code, and a weight is one
+//! scalar against three vectors. A register tile of 8 outputs × 3 vectors (4 × 3 where there are 16 registers)
+//! runs over all inputs. Every lane adds in the same order whatever the width of the vectors.
+
+use pulp::{Simd, WithSimd};
+
+use super::aligned::Aligned;
+use super::weights::{Matrix, PANEL, Weights};
+use super::{Folded, math};
+
+/// Vectors per row.
+const VECTORS: usize = 3;
+/// Interleaved partial sums of a layer norm: enough to hide the latency of addition.
+pub(super) const PARTIAL: usize = 4;
+/// ε of layer norm.
+pub(super) const EPSILON: f32 = 1e-5;
+
+type Row<S> = [<S as Simd>::f32s; VECTORS];
+
+/// Work for one thread: any number of directions, one after the other in blocks.
+pub(super) struct Blocks<'a> {
+    pub(super) weights: &'a Weights,
+    pub(super) folded: &'a Folded,
+    pub(super) directions: &'a [[f32; 3]],
+    /// As many as directions.
+    pub(super) out: &'a mut [[f32; 3]],
+    /// Log radiance instead of radiance.
+    pub(super) log: bool,
+    pub(super) scratch: &'a mut Aligned,
+}
+
+impl WithSimd for Blocks<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { weights, folded, directions, out, log, scratch } = self;
+        let row = VECTORS * S::F32_LANES;
+        let (hidden, widest) =
+            (weights.padded(), weights.input.iter().map(|c| c.weight.inputs).max().unwrap_or(0));
+        let scratch = scratch.at_least(row * (4 + hidden + hidden.max(widest) + PANEL));
+        let (rows, _) = S::as_mut_simd_f32s(scratch).0.as_chunks_mut::<VECTORS>();
+        let (direction, rows) = rows.split_at_mut(4);
+        let (x, rows) = rows.split_at_mut(hidden);
+        let (y, rows) = rows.split_at_mut(hidden.max(widest));
+        let rgb = &mut rows[..PANEL];
+        for (directions, out) in directions.chunks(row).zip(out.chunks_mut(row)) {
+            scatter(simd, directions, direction);
+            network(simd, weights, folded, direction, x, y, rgb);
+            let offset = simd.splat_f32s(folded.log_exposure);
+            for value in rgb[..3].as_flattened_mut() {
+                *value = simd.add_f32s(*value, offset);
+                if !log {
+                    *value = math::exp(simd, *value);
+                }
+            }
+            let rgb: &[f32] = bytemuck::cast_slice(rgb);
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = [rgb[i], rgb[row + i], rgb[2 * row + i]];
+            }
+        }
+    }
+}
+
+/// Directions to rows x, y, z and √(x² + y²). A short last block keeps finite numbers in its idle lanes.
+#[inline(always)]
+fn scatter<S: Simd>(simd: S, directions: &[[f32; 3]], rows: &mut [Row<S>]) {
+    let lanes = VECTORS * S::F32_LANES;
+    let flat: &mut [f32] = bytemuck::cast_slice_mut(rows.as_flattened_mut());
+    for (i, direction) in directions.iter().enumerate() {
+        for (k, value) in direction.iter().enumerate() {
+            flat[k * lanes + i] = *value;
+        }
+    }
+    for v in 0..VECTORS {
+        let (x, y) = (rows[0][v], rows[1][v]);
+        rows[3][v] = simd.sqrt_f32s(simd.mul_add_f32s(x, x, simd.mul_f32s(y, y)));
+    }
+}
+
+/// Log radiance of one block into the first three rows of `rgb`. `x` and `y` are room for activations.
+#[inline(always)]
+fn network<S: Simd>(
+    simd: S,
+    weights: &Weights,
+    folded: &Folded,
+    direction: &[Row<S>],
+    x: &mut [Row<S>],
+    y: &mut [Row<S>],
+    rgb: &mut [Row<S>],
+) {
+    let hidden = weights.hidden;
+    for (i, chunk) in weights.input.iter().enumerate() {
+        encode(simd, folded, chunk.inputs.clone(), direction, y);
+        if i == 0 {
+            product::<S, false, false>(simd, &chunk.weight, &folded.input_bias, y, x);
+        } else {
+            product::<S, true, false>(simd, &chunk.weight, &folded.no_bias, y, x);
+        }
+    }
+    for (layer, shift) in weights.layers.iter().zip(&folded.shift) {
+        normalise(simd, &mut x[..hidden], &layer.gamma1, &layer.beta1);
+        product::<S, false, true>(simd, &layer.ff1, &layer.ff1_bias, x, y);
+        product::<S, true, false>(simd, &layer.ff2, &layer.ff2_bias, y, x);
+        normalise(simd, &mut x[..hidden], &layer.gamma2, shift);
+    }
+    product::<S, false, false>(simd, &weights.output, &weights.output_bias, x, rgb);
+}
+
+/// Five features of each directional input: sine and cosine at frequencies 1 and 4, and the input itself.
+#[inline(always)]
+fn encode<S: Simd>(
+    simd: S,
+    folded: &Folded,
+    inputs: std::ops::Range<usize>,
+    direction: &[Row<S>],
+    features: &mut [Row<S>],
+) {
+    let n = folded.vectors.len();
+    let (out, _) = features.as_chunks_mut::<5>();
+    for (j, out) in inputs.zip(out) {
+        for v in 0..VECTORS {
+            let (value, turns) = match folded.vectors.get(j) {
+                Some(z) => {
+                    inner_product(simd, z.map(|c| simd.splat_f32s(c)), [direction[0][v], direction[1][v]])
+                }
+                None => [direction[2 + j - n][v]; 2].into(),
+            };
+            let [sin1, cos1] = math::sin_cos_turns(simd, turns);
+            // times 4 is exact, so the second frequency is as accurate as the first
+            let [sin4, cos4] = math::sin_cos_turns(simd, simd.mul_f32s(turns, simd.splat_f32s(4.0)));
+            for (row, value) in out.iter_mut().zip([sin1, sin4, cos1, cos4, value]) {
+                row[v] = value;
+            }
+        }
+    }
+}
+
+/// ⟨z, d⟩ rounded, and the same in turns modulo 1 with an error that does not grow with |z|: the products'
+/// rounding errors are recovered by fused multiply-add, and whole turns are dropped before adding.
+#[inline(always)]
+pub(super) fn inner_product<S: Simd>(simd: S, z: [S::f32s; 2], d: [S::f32s; 2]) -> (S::f32s, S::f32s) {
+    let [(a, a_low), (b, b_low)] = [0, 1].map(|k| {
+        let product = simd.mul_f32s(z[k], d[k]);
+        (product, simd.mul_add_f32s(z[k], d[k], simd.neg_f32s(product)))
+    });
+    let high = simd.add_f32s(math::fraction(simd, a), math::fraction(simd, b));
+    (simd.add_f32s(a, b), simd.add_f32s(high, simd.add_f32s(a_low, b_low)))
+}
+
+/// y = W x + b, with ADD y + W x + b, with RELU max(0, ·). Bias has a value for every row of whole panels.
+#[inline(always)]
+fn product<S: Simd, const ADD: bool, const RELU: bool>(
+    simd: S,
+    weight: &Matrix,
+    bias: &[f32],
+    x: &[Row<S>],
+    y: &mut [Row<S>],
+) {
+    let x = &x[..weight.inputs];
+    let (bias, _) = bias.as_chunks::<PANEL>();
+    let (y, _) = y.as_chunks_mut::<PANEL>();
+    for ((panel, bias), y) in weight.panels().zip(bias).zip(y) {
+        // 24 sums and 3 inputs, or 12 sums, 3 inputs and a weight, fill the registers
+        if S::REGISTER_COUNT >= 32 {
+            tile::<S, 8, 0, ADD, RELU>(simd, panel, bias, x, y);
+        } else {
+            tile::<S, 4, 0, ADD, RELU>(simd, panel, bias, x, y);
+            tile::<S, 4, 4, ADD, RELU>(simd, panel, bias, x, y);
+        }
+    }
+}
+
+/// Outputs FROM .. FROM + ROWS of a panel.
+#[inline(always)]
+fn tile<S: Simd, const ROWS: usize, const FROM: usize, const ADD: bool, const RELU: bool>(
+    simd: S,
+    panel: &[[f32; PANEL]],
+    bias: &[f32; PANEL],
+    x: &[Row<S>],
+    y: &mut [Row<S>; PANEL],
+) {
+    let mut sums: [Row<S>; ROWS] = std::array::from_fn(|i| [simd.splat_f32s(bias[FROM + i]); VECTORS]);
+    if ADD {
+        for i in 0..ROWS {
+            for v in 0..VECTORS {
+                sums[i][v] = simd.add_f32s(sums[i][v], y[FROM + i][v]);
+            }
+        }
+    }
+    for (weights, x) in panel.iter().zip(x) {
+        for i in 0..ROWS {
+            let w = simd.splat_f32s(weights[FROM + i]);
+            for v in 0..VECTORS {
+                sums[i][v] = simd.mul_add_e_f32s(w, x[v], sums[i][v]);
+            }
+        }
+    }
+    let zero = simd.splat_f32s(0.0);
+    for i in 0..ROWS {
+        for v in 0..VECTORS {
+            y[FROM + i][v] = if RELU { simd.max_f32s(sums[i][v], zero) } else { sums[i][v] };
+        }
+    }
+}
+
+/// x ← γ (x − mean)/√(variance + ε) + shift over the rows.
+#[inline(always)]
+fn normalise<S: Simd>(simd: S, x: &mut [Row<S>], gamma: &[f32], shift: &[f32]) {
+    let count = simd.splat_f32s(x.len() as f32);
+    let mean = sum(simd, x, |x, _| x, [simd.splat_f32s(0.0); VECTORS]).map(|s| simd.div_f32s(s, count));
+    let squares = sum(
+        simd,
+        x,
+        |x, mean| {
+            let d = simd.sub_f32s(x, mean);
+            simd.mul_f32s(d, d)
+        },
+        mean,
+    );
+    let scale = squares.map(|s| {
+        let variance = simd.add_f32s(simd.div_f32s(s, count), simd.splat_f32s(EPSILON));
+        simd.div_f32s(simd.splat_f32s(1.0), simd.sqrt_f32s(variance))
+    });
+    for ((row, gamma), shift) in x.iter_mut().zip(gamma).zip(shift) {
+        let (gamma, shift) = (simd.splat_f32s(*gamma), simd.splat_f32s(*shift));
+        for v in 0..VECTORS {
+            let centred = simd.sub_f32s(row[v], mean[v]);
+            row[v] = simd.mul_add_e_f32s(centred, simd.mul_f32s(scale[v], gamma), shift);
+        }
+    }
+}
+
+/// Σ term(x, mean) over the rows, in [`PARTIAL`] interleaved sums.
+#[inline(always)]
+fn sum<S: Simd>(simd: S, x: &[Row<S>], term: impl Fn(S::f32s, S::f32s) -> S::f32s, mean: Row<S>) -> Row<S> {
+    let mut sums = [[simd.splat_f32s(0.0); VECTORS]; PARTIAL];
+    let (whole, rest) = x.as_chunks::<PARTIAL>();
+    let rows = whole.iter().map(|rows| &rows[..]).chain(std::iter::once(rest));
+    for rows in rows {
+        for (sum, row) in sums.iter_mut().zip(rows) {
+            for v in 0..VECTORS {
+                sum[v] = simd.add_f32s(sum[v], term(row[v], mean[v]));
+            }
+        }
+    }
+    let [a, b, c, d] = sums;
+    std::array::from_fn(|v| simd.add_f32s(simd.add_f32s(a[v], b[v]), simd.add_f32s(c[v], d[v])))
+}

@@ -1,0 +1,168 @@
+//! Symmetries, agreement of the entry points, and refusals.
+
+use super::*;
+use crate::latent::{Latent, Prior};
+use crate::sphere::Equirect;
+
+fn log(field: &crate::field::Field, directions: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let mut out = vec![[0.0; 3]; directions.len()];
+    field.log_radiance_batch(directions, &mut out);
+    out
+}
+
+/// Turning the latent and turning the directions are the same to 1e-5 in log radiance.
+#[test]
+fn turning_the_latent_turns_the_sky() {
+    let directions = directions(500);
+    for n in [9, 100] {
+        let (decoder, latent) = (filler(n).decoder(), Latent::from_seed(&Prior::standard(n), 5));
+        let still = decoder.condition(&latent).unwrap();
+        for angle in [0.1, 1.0, 2.5, -3.0, 100.0f64] {
+            let (sin, cos) = angle.sin_cos();
+            let turned: Vec<_> = directions
+                .iter()
+                .map(|d| {
+                    let [x, y] = [f64::from(d[0]), f64::from(d[1])];
+                    [(x * cos - y * sin) as f32, (x * sin + y * cos) as f32, d[2]]
+                })
+                .collect();
+            let expected = log(&still, &directions);
+            let by_latent = log(&decoder.condition(&latent.turned(angle)).unwrap(), &turned);
+            assert!(
+                distance(&by_latent, &expected) <= 1e-5,
+                "{n}, {angle}: {:e}",
+                distance(&by_latent, &expected)
+            );
+            let by_field = log(&still.turned(angle), &turned);
+            assert!(distance(&by_field, &expected) <= 1e-5);
+            // and a wrong sense of turning would be seen
+            assert!(distance(&log(&still.turned(-angle), &turned), &expected) > 1e-2);
+        }
+        let mirrored: Vec<_> = directions.iter().map(|[x, y, z]| [*x, -y, *z]).collect();
+        let reflected = log(&decoder.condition(&latent.mirrored()).unwrap(), &mirrored);
+        assert!(distance(&reflected, &log(&still, &directions)) <= 1e-6);
+        assert!(distance(&log(&still, &mirrored), &log(&still, &directions)) > 1e-2);
+    }
+}
+
+/// A quarter turn of the field moves the baked columns by a quarter of the width.
+#[test]
+fn turned_bake_is_a_column_shift() {
+    let field = filler(9).decoder().condition(&Latent::from_seed(&Prior::standard(9), 2)).unwrap();
+    let grid = Equirect::new(32, 16);
+    let (still, turned) = (field.bake(grid), field.turned(std::f64::consts::FRAC_PI_2).bake(grid));
+    for (a, b) in still.chunks(32).zip(turned.chunks(32)) {
+        for column in 0..32 {
+            // azimuth grows to the left, so turning by +90° moves the picture left
+            let (a, b) = (a[(column + 8) % 32], b[column]);
+            assert!((0..3).all(|k| (a[k] / b[k] - 1.0).abs() < 1e-5), "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn every_entry_point_gives_the_same_bits() {
+    for model in [filler(9), filler(30), odd(5, 13, VnReluForm::Projection)] {
+        let n = model.latent_vectors();
+        let mut latent = Latent::from_seed(&Prior::standard(n), 8);
+        latent.log_exposure = 0.4;
+        let field = model.decoder().condition(&latent).unwrap();
+        let grid = Equirect::new(67, 31);
+        let directions = grid.directions();
+        let mut batch = vec![[0.0; 3]; directions.len()];
+        field.radiance_batch(&directions, &mut batch);
+        assert_eq!(field.bake(grid), batch);
+        let mut rows = vec![];
+        let mut each = |row: usize, pixels: &[[f32; 3]]| {
+            assert_eq!(row * 67, rows.len());
+            rows.extend_from_slice(pixels);
+            Ok::<_, ()>(())
+        };
+        field.bake_rows(grid, 0..31, &mut each).unwrap();
+        assert_eq!(rows, batch);
+        for (direction, expected) in directions.iter().zip(&batch).step_by(97) {
+            assert_eq!(field.radiance(*direction), *expected);
+            let log = field.log_radiance(*direction);
+            assert!((0..3).all(|k| (log[k].exp() / expected[k] - 1.0).abs() < 1e-6));
+        }
+        let mut some = vec![[0.0; 3]; 40];
+        field.radiance_batch(&directions[100..140], &mut some);
+        assert_eq!(some, batch[100..140]);
+    }
+}
+
+#[test]
+fn a_range_of_rows_and_an_early_end() {
+    let field = filler(2).decoder().condition(&Latent::from_seed(&Prior::standard(2), 8)).unwrap();
+    let grid = Equirect::new(16, 8);
+    let whole = field.bake(grid);
+    let mut seen = vec![];
+    let mut sink = |row: usize, pixels: &[[f32; 3]]| {
+        assert_eq!(pixels, &whole[row * 16..][..16]);
+        seen.push(row);
+        if row == 5 { Err("full") } else { Ok(()) }
+    };
+    assert_eq!(field.bake_rows(grid, 3..8, &mut sink), Err("full"));
+    assert_eq!(field.bake_rows(grid, 0..0, &mut sink), Ok(()));
+    assert_eq!(seen, [3, 4, 5]);
+}
+
+#[test]
+fn exposure_scales_radiance() {
+    let decoder = filler(9).decoder();
+    let mut latent = Latent::from_seed(&Prior::standard(9), 1);
+    let dim = decoder.condition(&latent).unwrap();
+    latent.log_exposure = 8f32.ln();
+    let [bright, brightened] = [decoder.condition(&latent).unwrap(), dim.brightened(3.0)];
+    for direction in directions(20) {
+        let radiance = [&dim, &bright, &brightened].map(|field| field.radiance(direction));
+        for k in 0..3 {
+            assert!((radiance[1][k] / radiance[0][k] - 8.0).abs() < 1e-5);
+            assert!((radiance[2][k] / radiance[0][k] - 8.0).abs() < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn poles_and_a_zero_latent_are_finite() {
+    for form in [VnReluForm::Projection, VnReluForm::Reference, VnReluForm::ReferenceNormGuard] {
+        let decoder = odd(9, 16, form).decoder();
+        for latent in [Latent::new(vec![[0.0; 3]; 9]), Latent::from_seed(&Prior::standard(9), 1)] {
+            let field = decoder.condition(&latent).unwrap();
+            for direction in [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [-0.0, 0.0, 1.0], [1.0, 0.0, 0.0]] {
+                assert!(field.radiance(direction).iter().all(|v| v.is_finite() && *v > 0.0));
+            }
+        }
+    }
+}
+
+#[test]
+fn unusable_latents_are_refused_with_the_reason() {
+    let model = filler(9);
+    let decoder = model.decoder();
+    let good = Latent::from_seed(&Prior::standard(9), 1);
+    let reason = |change: &dyn Fn(&mut Latent)| {
+        let mut latent = good.clone();
+        change(&mut latent);
+        decoder.condition(&latent).unwrap_err().to_string()
+    };
+    assert!(reason(&|l| l.vectors[3][1] = f32::NAN).contains("vector 3"));
+    assert!(reason(&|l| l.vectors[3][1] = 1e9).contains("beyond"));
+    assert!(reason(&|l| l.log_exposure = f32::INFINITY).contains("exposure"));
+    assert!(reason(&|l| l.vectors.truncate(8)).contains("8 vectors"));
+    assert!(reason(&|l| l.model = Some("0123456789abcdef".into())).contains(&model.hash()));
+    let own = Latent { model: Some(model.hash()), ..good.clone() };
+    assert!(decoder.condition(&own).is_ok());
+}
+
+/// What is far out in log radiance stays a finite, positive radiance.
+#[test]
+fn extreme_exposures_stay_finite() {
+    let decoder = filler(9).decoder();
+    let mut latent = Latent::from_seed(&Prior::standard(9), 1);
+    for exposure in [-300.0, 300.0] {
+        latent.log_exposure = exposure;
+        let radiance = decoder.condition(&latent).unwrap().radiance([1.0, 0.0, 0.0]);
+        assert!(radiance.iter().all(|v| v.is_finite() && *v > 0.0), "{radiance:?}");
+    }
+}

@@ -1,0 +1,178 @@
+//! The latent file: JSON `{format, model, n, vectors, exposure, source}`.
+//!
+//! `vectors` is N triples [x, y, z]; `exposure` the natural log of the factor to radiance; `model` and `source`
+//! may be null or absent. The same text goes into the attribute of a baked panorama.
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::Latent;
+use crate::output::{Overwrite, write_atomic};
+use crate::{Error, Result};
+
+/// Largest latent file that is read; N = 4096 vectors take about 200 kB.
+pub const MAX_LATENT_BYTES: u64 = 16 << 20;
+
+const FORMAT: u32 = 1;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Text {
+    format: u32,
+    #[serde(default)]
+    model: Option<String>,
+    n: usize,
+    vectors: Vec<[f32; 3]>,
+    exposure: f32,
+    #[serde(default)]
+    source: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct Format {
+    format: u32,
+}
+
+impl Latent {
+    /// The JSON text, on one line. Every number comes back to the bit.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if a number is not finite.
+    pub fn to_json(&self) -> Result<String> {
+        self.check_finite()?;
+        let text = Text {
+            format: FORMAT,
+            model: self.model.clone(),
+            n: self.vectors.len(),
+            vectors: self.vectors.clone(),
+            exposure: self.log_exposure,
+            source: self.source.clone(),
+        };
+        serde_json::to_string(&text).map_err(|e| Error::invalid(format!("the latent cannot be written: {e}")))
+    }
+
+    /// Reads the JSON text.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if it is no such JSON, if `n` is not the number of vectors, or a number is not
+    /// finite; [`Error::Unsupported`] for an unknown format.
+    pub fn from_json(json: &str) -> Result<Self> {
+        let broken = |e: serde_json::Error| Error::invalid(format!("not a latent ({e})"));
+        let Format { format } = serde_json::from_str(json).map_err(broken)?;
+        if format != FORMAT {
+            return Err(Error::unsupported(format!(
+                "latent format {format} is unknown (this program reads format {FORMAT})"
+            )));
+        }
+        let text: Text = serde_json::from_str(json).map_err(broken)?;
+        if text.n != text.vectors.len() {
+            let (n, count) = (text.n, text.vectors.len());
+            return Err(Error::invalid(format!(
+                "a latent of n = {n} must have {n} vectors, this has {count}"
+            )));
+        }
+        let Text { model, vectors, exposure, source, .. } = text;
+        let latent = Self { vectors, log_exposure: exposure, model, source };
+        latent.check_finite()?;
+        Ok(latent)
+    }
+
+    /// Reads a latent file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be read; otherwise as [`Latent::from_json`], also for a file larger than
+    /// [`MAX_LATENT_BYTES`].
+    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+        let mut bytes = Vec::new();
+        file.take(MAX_LATENT_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
+        if bytes.len() as u64 > MAX_LATENT_BYTES {
+            return Err(Error::invalid("not a latent (too large)").in_file(path));
+        }
+        let text =
+            String::from_utf8(bytes).map_err(|_| Error::invalid("not a latent (no text)").in_file(path))?;
+        Self::from_json(&text).map_err(|e| e.in_file(path))
+    }
+
+    /// Writes a latent file, all or nothing.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the file exists and may not be replaced, or a number is not finite;
+    /// [`Error::Io`] if it cannot be written.
+    pub fn save(&self, path: impl AsRef<Path>, overwrite: Overwrite) -> Result<()> {
+        let path = path.as_ref();
+        let text = self.to_json().map_err(|e| e.in_file(path))?;
+        write_atomic(path, overwrite, |file| {
+            writeln!(file, "{text}").map_err(|e| Error::io(path, "write", e))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::latent::Prior;
+
+    #[test]
+    fn every_bit_survives_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sky.json");
+        for seed in 0..50 {
+            let mut latent = Latent::from_seed(&Prior::standard(20), seed);
+            latent.vectors[0] = [f32::MIN_POSITIVE, -0.0, f32::MAX];
+            latent.vectors[1] = [1e-45, 1.0 / 3.0, -16_777_217.0];
+            (latent.log_exposure, latent.model) = (-7.3, Some("0123456789abcdef".into()));
+            latent.save(&path, Overwrite::Replace).unwrap();
+            let back = Latent::load(&path).unwrap();
+            let bits = |l: &Latent| l.vectors.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&back), bits(&latent));
+            assert_eq!(back, latent);
+        }
+        let latent = Latent::load(&path).unwrap();
+        assert!(latent.save(&path, Overwrite::Refuse).is_err());
+    }
+
+    #[test]
+    fn bad_text_is_refused_with_its_reason() {
+        let good = r#"{"format":1,"n":1,"vectors":[[1,2,3]],"exposure":0.5}"#;
+        assert_eq!(Latent::from_json(good).unwrap().vectors, [[1.0, 2.0, 3.0]]);
+        let reason = |from: &str, to: &str| {
+            let text = good.replacen(from, to, 1);
+            assert_ne!(text, good, "nothing replaced");
+            Latent::from_json(&text).unwrap_err()
+        };
+        assert!(
+            matches!(reason("\"format\":1", "\"format\":2"), Error::Unsupported(m) if m.contains("format 2"))
+        );
+        for (from, to, says) in [
+            ("\"n\":1", "\"n\":2", "n = 2"),
+            ("[1,2,3]", "[1,2]", "not a latent"),
+            ("[1,2,3]", "[1,null,3]", "not a latent"),
+            ("[1,2,3]", "[1,1e39,3]", "out of range"),
+            ("0.5", "NaN", "not a latent"),
+            ("}", "", "not a latent"),
+            ("\"n\"", "\"m\"", "not a latent"),
+            ("{", "[", "not a latent"),
+        ] {
+            let error = reason(from, to);
+            assert!(matches!(&error, Error::Invalid(m) if m.contains(says)), "{from} → {to}: {error}");
+        }
+    }
+
+    #[test]
+    fn files_that_are_no_latent_name_themselves() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("noise.json");
+        assert!(matches!(Latent::load(&path), Err(Error::Io { .. })));
+        std::fs::write(&path, [0xff, 0xfe, 0, 1]).unwrap();
+        assert!(Latent::load(&path).unwrap_err().to_string().contains("noise.json"));
+        std::fs::write(&path, vec![b' '; MAX_LATENT_BYTES as usize + 1]).unwrap();
+        assert!(Latent::load(&path).unwrap_err().to_string().contains("too large"));
+        let nan = Latent::new(vec![[f32::NAN, 0.0, 0.0]]);
+        assert!(nan.save(&path, Overwrite::Replace).is_err());
+    }
+}

@@ -1,0 +1,299 @@
+//! A Gaussian over latent codes that does not prefer a compass direction.
+//!
+//! With c = x + iy for the N vectors, a distribution that is invariant under turning about z has E c = 0,
+//! E c cᵀ = 0 and no correlation between c and z. What remains is the Hermitian covariance C = E c cᴴ (how
+//! vectors turn and stretch together) and mean and covariance Σ of z. A sample is c = L w, z = μ + K g, with
+//! C = L Lᴴ, Σ = K Kᵀ, w circular complex normal (E|w|² = 1) and g standard normal.
+
+use rand::Rng;
+
+use super::{Latent, normal};
+use crate::{Error, Result};
+
+/// A turn-invariant Gaussian of N latent vectors, and a normal log exposure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    /// Row-major lower triangles, [N, N].
+    pub(crate) xy_real: Vec<f32>,
+    pub(crate) xy_imaginary: Vec<f32>,
+    pub(crate) z: Vec<f32>,
+    pub(crate) z_mean: Vec<f32>,
+    /// Mean and standard deviation.
+    pub(crate) log_exposure: [f32; 2],
+}
+
+impl Prior {
+    /// Every coordinate standard normal, exposure 0: the prior that training assumes.
+    pub fn standard(latent_vectors: usize) -> Self {
+        let n = latent_vectors;
+        let diagonal = |value: f32| (0..n * n).map(|i| if i % (n + 1) == 0 { value } else { 0.0 }).collect();
+        Self {
+            xy_real: diagonal(std::f32::consts::SQRT_2), // E|c|² = 2
+            xy_imaginary: vec![0.0; n * n],
+            z: diagonal(1.0),
+            z_mean: vec![0.0; n],
+            log_exposure: [0.0; 2],
+        }
+    }
+
+    /// N, the number of vectors.
+    pub fn latent_vectors(&self) -> usize {
+        self.z_mean.len()
+    }
+
+    /// Mean and standard deviation of the log exposure.
+    pub fn log_exposure(&self) -> [f32; 2] {
+        self.log_exposure
+    }
+
+    /// Fits the codes of a training set.
+    ///
+    /// `variances`, if given, holds for each code the N posterior variances (per coordinate); their means are
+    /// added to the diagonals, so that samples fill the posterior's width too. Since a set is often smaller
+    /// than N, both covariances are shrunk towards a multiple of the identity by the factor of Ledoit and
+    /// Wolf (2004), which is estimated from the codes, and no direction has less than a millionth of the mean
+    /// variance.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if there are fewer than two codes, their N differ, a number is not finite, or
+    /// `variances` does not match.
+    pub fn fit(codes: &[Latent], variances: Option<&[Vec<f32>]>) -> Result<Self> {
+        if codes.len() < 2 {
+            return Err(Error::invalid(format!("a prior needs at least two codes, got {}", codes.len())));
+        }
+        let (n, count) = (codes[0].vectors.len(), codes.len() as f64);
+        for code in codes {
+            code.check_finite()?;
+            if n == 0 || code.vectors.len() != n {
+                let m = code.vectors.len();
+                return Err(Error::invalid(format!(
+                    "a prior needs codes of one size, got {n} and {m} vectors"
+                )));
+            }
+        }
+        let noise = mean_variances(codes.len(), n, variances)?;
+        let mean = |value: &dyn Fn(&Latent) -> f64| codes.iter().map(value).sum::<f64>() / count;
+        let z_mean: Vec<f64> = (0..n).map(|i| mean(&|code| f64::from(code.vectors[i][2]))).collect();
+        let exposure = mean(&|code| f64::from(code.log_exposure));
+        let spread = mean(&|code| (f64::from(code.log_exposure) - exposure).powi(2)).sqrt();
+        let samples = |part: &dyn Fn(usize, [f32; 3]) -> Complex| -> Vec<Vec<Complex>> {
+            let vectors = |code: &Latent| code.vectors.iter().enumerate().map(|(i, v)| part(i, *v)).collect();
+            codes.iter().map(vectors).collect()
+        };
+        let xy = samples(&|_, [x, y, _]| [f64::from(x), f64::from(y)]);
+        let z = samples(&|i, v| [f64::from(v[2]) - z_mean[i], 0.0]);
+        // one variance per coordinate, and c has two of them
+        let xy = cholesky(shrunk_covariance(&xy, &noise, 2.0), n);
+        let z = cholesky(shrunk_covariance(&z, &noise, 1.0), n);
+        let part = |matrix: &[Complex], k: usize| matrix.iter().map(|c| c[k] as f32).collect();
+        Ok(Self {
+            xy_real: part(&xy, 0),
+            xy_imaginary: part(&xy, 1),
+            z: part(&z, 0),
+            z_mean: z_mean.iter().map(|v| *v as f32).collect(),
+            log_exposure: [exposure as f32, spread as f32],
+        })
+    }
+
+    /// Draws vectors and exposure; see [`Latent::sample`].
+    pub(super) fn sample<R: Rng + ?Sized>(&self, rng: &mut R) -> Latent {
+        let n = self.latent_vectors();
+        let w: Vec<[f64; 2]> =
+            (0..n).map(|_| normal::pair(rng).map(|g| g * std::f64::consts::FRAC_1_SQRT_2)).collect();
+        let g: Vec<f64> = (0..n.div_ceil(2)).flat_map(|_| normal::pair(rng)).collect();
+        let [exposure, _] = normal::pair(rng);
+        let vector = |i: usize| {
+            let mut v = [0.0, 0.0, f64::from(self.z_mean[i])];
+            for j in 0..=i {
+                let at = i * n + j;
+                let (re, im) = (f64::from(self.xy_real[at]), f64::from(self.xy_imaginary[at]));
+                v[0] += re * w[j][0] - im * w[j][1];
+                v[1] += re * w[j][1] + im * w[j][0];
+                v[2] += f64::from(self.z[at]) * g[j];
+            }
+            v.map(|c| c as f32)
+        };
+        let [mean, deviation] = self.log_exposure.map(f64::from);
+        Latent {
+            vectors: (0..n).map(vector).collect(),
+            log_exposure: (mean + deviation * exposure) as f32,
+            ..Latent::default()
+        }
+    }
+}
+
+/// [real, imaginary]
+type Complex = [f64; 2];
+
+fn mean_variances(codes: usize, n: usize, variances: Option<&[Vec<f32>]>) -> Result<Vec<f64>> {
+    let mut mean = vec![0.0; n];
+    let Some(variances) = variances else { return Ok(mean) };
+    if variances.len() != codes || variances.iter().any(|v| v.len() != n) {
+        return Err(Error::invalid(format!("a prior of {codes} codes needs {codes} × {n} variances")));
+    }
+    for (i, value) in variances.iter().flat_map(|v| v.iter().enumerate()) {
+        if !(value.is_finite() && *value >= 0.0) {
+            return Err(Error::invalid(format!("a posterior variance is {value}")));
+        }
+        mean[i] += f64::from(*value) / codes as f64;
+    }
+    Ok(mean)
+}
+
+/// (1 − ρ) S + ρ m I + k·diag(noise) of centred samples, S = mean of x xᴴ, m = tr S / N, row-major.
+///
+/// ρ = min(1, b²/d²) with d² = ‖S − m I‖² and b² = (1/n²) Σ ‖x xᴴ − S‖² = (Σ ‖x‖⁴/n − ‖S‖²)/n.
+fn shrunk_covariance(samples: &[Vec<Complex>], noise: &[f64], k: f64) -> Vec<Complex> {
+    let (n, count) = (noise.len(), samples.len() as f64);
+    let mut s = vec![[0.0; 2]; n * n];
+    let mut fourth = 0.0;
+    for x in samples {
+        for (i, [a, b]) in x.iter().enumerate() {
+            for (j, [c, d]) in x.iter().enumerate() {
+                let sum = &mut s[i * n + j];
+                *sum = [sum[0] + (a * c + b * d) / count, sum[1] + (b * c - a * d) / count];
+            }
+        }
+        fourth += x.iter().map(|[a, b]| a * a + b * b).sum::<f64>().powi(2) / count;
+    }
+    let mean = (0..n).map(|i| s[i * n + i][0]).sum::<f64>() / n as f64;
+    let norm: f64 = s.iter().map(|[a, b]| a * a + b * b).sum();
+    let (distance, error) = (norm - n as f64 * mean * mean, (fourth - norm) / count);
+    let shrink = if distance > 0.0 { (error / distance).clamp(0.0, 1.0) } else { 1.0 };
+    for value in s.as_flattened_mut() {
+        *value *= 1.0 - shrink;
+    }
+    // the absolute part keeps a set of identical codes factorable
+    let floor = (1e-6 * mean).max(1e-12);
+    for i in 0..n {
+        s[i * n + i][0] += shrink * mean + k * noise[i] + floor;
+    }
+    s
+}
+
+/// Lower triangle L with L Lᴴ = the given positive definite matrix; zeros above.
+fn cholesky(mut a: Vec<Complex>, n: usize) -> Vec<Complex> {
+    for i in 0..n {
+        for j in 0..=i {
+            let [mut re, mut im] = a[i * n + j];
+            for k in 0..j {
+                let ([p, q], [r, s]) = (a[i * n + k], a[j * n + k]);
+                re -= p * r + q * s;
+                im -= q * r - p * s;
+            }
+            // the floor on the diagonal keeps pivots positive; the guard is for its rounding
+            a[i * n + j] =
+                if i == j { [re.max(1e-14).sqrt(), 0.0] } else { [re, im].map(|v| v / a[j * n + j][0]) };
+        }
+        for j in i + 1..n {
+            a[i * n + j] = [0.0; 2];
+        }
+    }
+    a
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    /// Codes with known statistics: c₁ = r·e^{iα} turned by a random angle, c₂ = i c₁/2 + noise, z = (3, −1) ± .
+    fn codes(count: usize, seed: u64) -> Vec<Latent> {
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        let mut code = || {
+            let ([a, b], [c, d], [e, f]) = (normal::pair(rng), normal::pair(rng), normal::pair(rng));
+            let second = [-0.5 * b + 0.2 * c, 0.5 * a + 0.2 * d];
+            let vectors = vec![[a, b, 3.0 + e], [second[0], second[1], -1.0 + 0.5 * e + 0.1 * f]];
+            let vectors = vectors.into_iter().map(|v| v.map(|x| x as f32)).collect();
+            Latent { log_exposure: (2.0 + 0.25 * f) as f32, ..Latent::new(vectors) }
+        };
+        (0..count).map(|_| code()).collect()
+    }
+
+    /// Second moments (re c₁c₂*, im c₁c₂*, |c₁|², |c₂|², cov z, means of z) and the exposure's statistics.
+    fn moments(codes: &[Latent]) -> Vec<f64> {
+        let mean = |value: &dyn Fn([f64; 3], [f64; 3], f64) -> f64| {
+            let value = |code: &Latent| {
+                let v = |i: usize| code.vectors[i].map(f64::from);
+                value(v(0), v(1), f64::from(code.log_exposure))
+            };
+            codes.iter().map(value).sum::<f64>() / codes.len() as f64
+        };
+        vec![
+            mean(&|p, q, _| p[0] * q[0] + p[1] * q[1]),
+            mean(&|p, q, _| p[1] * q[0] - p[0] * q[1]),
+            mean(&|p, _, _| p[0] * p[0] + p[1] * p[1]),
+            mean(&|_, q, _| q[0] * q[0] + q[1] * q[1]),
+            mean(&|p, q, _| (p[2] - 3.0) * (q[2] + 1.0)),
+            mean(&|p, _, _| p[2]),
+            mean(&|_, q, _| q[2]),
+            mean(&|_, _, e| e),
+            mean(&|_, _, e| (e - 2.0).powi(2)) * 10.0,
+            // zero by invariance: E c cᵀ and the correlation of c with z
+            mean(&|p, q, _| p[0] * q[0] - p[1] * q[1]),
+            mean(&|p, q, _| p[0] * q[1] + p[1] * q[0]),
+            mean(&|p, q, _| p[0] * (q[2] + 1.0)),
+        ]
+    }
+
+    #[test]
+    fn samples_have_the_fitted_statistics() {
+        let prior = Prior::fit(&codes(20_000, 1), None).unwrap();
+        let rng = &mut ChaCha8Rng::seed_from_u64(2);
+        let samples: Vec<_> = (0..40_000).map(|_| Latent::sample(&prior, rng)).collect();
+        let expected = [0.0, -1.0, 2.0, 0.58, 0.5, 3.0, -1.0, 2.0, 0.625, 0.0, 0.0, 0.0];
+        for (i, (ours, truth)) in moments(&samples).iter().zip(expected).enumerate() {
+            assert!((ours - truth).abs() < 0.05, "moment {i}: {ours} instead of {truth}");
+        }
+        let variances: Vec<_> = codes(20_000, 1).iter().map(|_| vec![0.5, 0.0]).collect();
+        let wide = Prior::fit(&codes(20_000, 1), Some(&variances)).unwrap();
+        let samples: Vec<_> = (0..40_000).map(|_| Latent::sample(&wide, rng)).collect();
+        assert!((moments(&samples)[2] - 3.0).abs() < 0.06, "posterior variance is not added");
+    }
+
+    /// Turning the training codes, each by its own angle or all by one, leaves the fit as it is.
+    #[test]
+    fn fit_is_invariant_under_turning() {
+        let codes = codes(500, 3);
+        let prior = Prior::fit(&codes, None).unwrap();
+        let turned: Vec<_> = codes.iter().enumerate().map(|(i, code)| code.turned(i as f64)).collect();
+        let other = Prior::fit(&turned, None).unwrap();
+        for (a, b) in [(&prior.xy_real, &other.xy_real), (&prior.xy_imaginary, &other.xy_imaginary)] {
+            assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6));
+        }
+        assert_eq!(prior.z, other.z);
+        assert!(prior.xy_imaginary.iter().any(|v| v.abs() > 0.1), "the test needs a complex covariance");
+    }
+
+    #[test]
+    fn few_codes_for_many_vectors_still_give_a_positive_definite_prior() {
+        let standard = Prior::standard(100);
+        let few: Vec<_> = (0..76).map(|seed| Latent::from_seed(&standard, seed)).collect();
+        let prior = Prior::fit(&few, None).unwrap();
+        let smallest = |l: &[f32]| (0..100).map(|i| l[i * 101]).fold(f32::MAX, f32::min);
+        // the truth is a multiple of the identity, so the shrinkage must be strong
+        assert!(smallest(&prior.xy_real) > 1.0, "{}", smallest(&prior.xy_real));
+        assert!(smallest(&prior.z) > 0.7, "{}", smallest(&prior.z));
+        let same = vec![few[0].clone(); 5];
+        let prior = Prior::fit(&same, None).unwrap();
+        Latent::from_seed(&prior, 1).check_finite().unwrap();
+    }
+
+    #[test]
+    fn seeds_are_reproducible_and_differ() {
+        let prior = Prior::fit(&codes(100, 5), None).unwrap();
+        assert_eq!(Latent::from_seed(&prior, 7), Latent::from_seed(&prior, 7));
+        assert_ne!(Latent::from_seed(&prior, 7).vectors, Latent::from_seed(&prior, 8).vectors);
+    }
+
+    #[test]
+    fn unusable_sets_are_refused() {
+        let codes = codes(3, 1);
+        assert!(Prior::fit(&codes[..1], None).is_err());
+        assert!(Prior::fit(&[codes[0].clone(), Latent::new(vec![[0.0; 3]])], None).is_err());
+        assert!(Prior::fit(&vec![Latent::default(); 3], None).is_err());
+        assert!(Prior::fit(&codes, Some(&[vec![0.1, 0.1]])).is_err());
+        assert!(Prior::fit(&codes, Some(&vec![vec![0.1, -0.1]; 3])).is_err());
+    }
+}

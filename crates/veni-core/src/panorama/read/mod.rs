@@ -1,0 +1,158 @@
+//! Reading: which format a file is, and the limits that its header must meet before pixels are allocated.
+
+mod exr;
+mod hdr;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::Path;
+
+use super::Panorama;
+use crate::sphere::Equirect;
+use crate::{Error, Result};
+
+/// The largest panorama that [`Panorama::read`] accepts: 2²⁸ pixels (a little over 23,000 × 11,500), which is
+/// 3 GiB of radiance. [`ReadOptions::max_pixels`] overrides it.
+pub const DEFAULT_MAX_PIXELS: usize = 1 << 28;
+
+/// What [`Panorama::read_with`] accepts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Largest number of pixels; a header that claims more is refused before anything is allocated.
+    pub max_pixels: usize,
+    /// Accept a width that is not twice the height.
+    pub any_aspect: bool,
+    /// Which EXR layer to read, for files with several ("ViewLayer.Combined" for channels "ViewLayer.Combined.R" …).
+    pub layer: Option<String>,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self { max_pixels: DEFAULT_MAX_PIXELS, any_aspect: false, layer: None }
+    }
+}
+
+impl ReadOptions {
+    /// Checks a size from a header.
+    fn check(&self, width: usize, height: usize) -> Result<Equirect> {
+        if width == 0 || height == 0 {
+            return Err(Error::invalid(format!("the header says {width} × {height}: there are no pixels")));
+        }
+        if width.checked_mul(height).is_none_or(|n| n > self.max_pixels) {
+            return Err(Error::invalid(format!(
+                "the header claims {width} × {height} pixels, more than the limit of {}",
+                self.max_pixels
+            )));
+        }
+        if width != 2 * height && !self.any_aspect {
+            return Err(Error::invalid(format!(
+                "{width} × {height} is no equirectangular panorama: its width must be twice its height"
+            )));
+        }
+        Ok(Equirect::new(width, height))
+    }
+}
+
+impl Panorama {
+    /// Reads an OpenEXR or Radiance `.hdr` panorama of at most [`DEFAULT_MAX_PIXELS`]; the content decides the
+    /// format, not the name. See [`Panorama::read_with`].
+    ///
+    /// # Errors
+    /// As [`Panorama::read_with`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        Self::read_with(path, &ReadOptions::default())
+    }
+
+    /// Reads an OpenEXR or Radiance `.hdr` panorama. Values are as stored (possibly not finite:
+    /// [`Panorama::sanitise`]), brought to Rec. 709 primaries where the file names others.
+    ///
+    /// - OpenEXR: every compression and sample type of the `exr` crate, scan lines or tiles, the largest level
+    ///   of multi-resolution files. The panorama is the display window; where the data window leaves some of it
+    ///   uncovered the pixels are black, as OpenEXR defines, and what lies outside is cut off. Colour channels
+    ///   are R, G, B or, failing that, Y alone as grey; alpha is ignored. A factor that [`HalfRange::Scale`]
+    ///   recorded in the file is divided out again.
+    /// - Radiance: values are divided by the product of the EXPOSURE lines, as that format asks.
+    ///
+    /// [`HalfRange::Scale`]: super::HalfRange::Scale
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for formats with a limited range (PNG, JPEG, …), cube maps, deep, subsampled or
+    /// XYZ-coded images; [`Error::Invalid`] for damaged files and for sizes that `options` refuse;
+    /// [`Error::Io`] if the file cannot be read.
+    pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
+        let path = path.as_ref();
+        let read = || -> Result<Self> {
+            let mut file = open(path)?;
+            match kind(&mut file, path)? {
+                Kind::Exr => exr::read(file, path, options),
+                Kind::Hdr { strict } => hdr::read(file, path, strict, options),
+            }
+        };
+        read().map_err(|e| e.in_file(path))
+    }
+}
+
+/// The text attributes of an EXR file, from its header alone (no pixel is read); those of the first part where
+/// parts disagree. A Radiance file gives its `NAME=value` header lines.
+///
+/// # Errors
+/// As [`Panorama::read_with`] where the header is concerned.
+pub fn attributes(path: impl AsRef<Path>) -> Result<BTreeMap<String, String>> {
+    let path = path.as_ref();
+    let read = || {
+        let mut file = open(path)?;
+        match kind(&mut file, path)? {
+            Kind::Exr => exr::attributes(file, path),
+            Kind::Hdr { strict } => hdr::attributes(file, path, strict),
+        }
+    };
+    read().map_err(|e| e.in_file(path))
+}
+
+fn open(path: &Path) -> Result<BufReader<File>> {
+    let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+    if file.metadata().map_err(|e| Error::io(path, "read", e))?.is_dir() {
+        return Err(Error::invalid("is a folder, not an image"));
+    }
+    Ok(BufReader::with_capacity(1 << 16, file))
+}
+
+enum Kind {
+    Exr,
+    Hdr { strict: bool },
+}
+
+/// Formats that hold no radiance, by their first bytes.
+const LIMITED_RANGE: [(&[u8], &str); 7] = [
+    (b"\x89PNG", "PNG"),
+    (b"\xFF\xD8\xFF", "JPEG"),
+    (b"RIFF", "WebP"),
+    (b"BM", "BMP"),
+    (b"GIF8", "GIF"),
+    (b"II*\0", "TIFF"),
+    (b"MM\0*", "TIFF"),
+];
+
+/// Recognises the format and rewinds.
+fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
+    let mut start = Vec::new();
+    file.take(16).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
+    file.rewind().map_err(|e| Error::io(path, "read", e))?;
+    if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        return Ok(Kind::Exr);
+    }
+    if start.starts_with(b"#?") {
+        return Ok(Kind::Hdr { strict: start.starts_with(b"#?RADIANCE") });
+    }
+    if let Some((_, name)) = LIMITED_RANGE.iter().find(|(magic, _)| start.starts_with(magic)) {
+        return Err(Error::unsupported(format!(
+            "{name} holds no high dynamic range; `veni-cli prepare` expands such panoramas into EXR files first"
+        )));
+    }
+    Err(if start.is_empty() {
+        Error::invalid("the file is empty")
+    } else {
+        Error::unsupported("neither an OpenEXR nor a Radiance .hdr file")
+    })
+}
