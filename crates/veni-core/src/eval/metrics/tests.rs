@@ -45,13 +45,6 @@ fn scores_fall_with_the_error() {
 }
 
 #[test]
-fn quantiles_interpolate() {
-    assert_eq!(quantile(&[4.0, 1.0, 3.0, 2.0], 0.5), 2.5);
-    assert_eq!(quantile(&[5.0], 0.98), 5.0);
-    assert_eq!(quantile(&[1.0, 2.0], 1.0), 2.0);
-}
-
-#[test]
 fn psnr_of_a_known_error() {
     // Range 2 (a negative minimum counts), error 0.2 everywhere: 20 log10(10).
     assert!((psnr(&[-0.8, 1.2], &[-1.0, 1.0]) - 20.0).abs() < 1e-9);

@@ -114,7 +114,7 @@ fn latent_gradients_agree_with_finite_differences() {
         let scale = gradient.iter().fold(0.0f32, |m, g| m.max(g.abs()));
         let base = values(&latent(&device));
         for i in 0..base.len() {
-            let step = 2e-3;
+            let step = 5e-4;
             let at = |delta: f32| {
                 let mut z = base.clone();
                 z[i] += delta;
@@ -122,7 +122,7 @@ fn latent_gradients_agree_with_finite_differences() {
                 probe(decoder.forward(z, directions(&device))).into_scalar::<f32>()
             };
             let found = (at(step) - at(-step)) / (2.0 * step);
-            // ReLU kinks and f32 rounding of the difference leave about a percent of the largest entry.
+            // Curvature (the encoding turns fast), ReLU kinks and f32 rounding leave about a percent.
             assert!((found - gradient[i]).abs() < 2e-2 * scale, "{form:?} {i}: {found} {}", gradient[i]);
         }
     }
