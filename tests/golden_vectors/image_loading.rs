@@ -1,30 +1,31 @@
 //! Preparing an HDR image for the model.
 
-use crate::case::{Case, Data};
-use crate::{Outcome, Outcome::Compared};
+use crate::{
+    Outcome,
+    case::{Case, Data},
+};
 use burn::tensor::Device;
-use veni::panorama::log_reference;
+use veni::panorama::{Panorama, log_reference};
+use veni::sphere::Equirect;
 
-/// In the files this number stands for +∞, which their writer could not store.
-const INFINITY: f32 = 3.4e38;
+/// The files hold finite numbers only; this one stands for +∞.
+const STANDS_FOR_INFINITY: f32 = 3.4e38;
 
-/// See [`Family`](crate::Family). No tensors: the device plays no part.
+/// See [`Family`](crate::Family).
 pub(crate) fn run(case: &Case, _device: &Device) -> Option<Outcome> {
     if case.module() != "image loading" {
         return None;
     }
-    for output in case.tensors.keys().filter(|n| n.starts_with("out.")) {
-        let Some(kind) = output.strip_prefix("out.log_") else { continue };
-        let mirrored = kind.strip_prefix("mirrored_");
-        let raw = case.data(&format!("in.raw_{}", mirrored.unwrap_or(kind)));
-        let [height, width, channels] = raw.shape[..] else { panic!("{:?} is no image", raw.shape) };
+    let raw = case.tensors.iter().filter_map(|(name, data)| Some((name.strip_prefix("in.raw_")?, data)));
+    for (kind, data) in raw {
+        let [height, width, channels] = data.shape[..] else { panic!("an image of shape {:?}", data.shape) };
         let values: Vec<f32> =
-            raw.values.iter().map(|&v| if v >= INFINITY { f32::INFINITY } else { v }).collect();
-        let mut pixels = log_reference(&values, channels).unwrap_or_else(|e| panic!("{output}: {e}"));
-        if mirrored.is_some() {
-            pixels.chunks_mut(width).for_each(<[_]>::reverse);
-        }
-        case.compare(output, &Data::new([height, width, 3], pixels.into_flattened()));
+            data.values.iter().map(|&v| if v >= STANDS_FOR_INFINITY { f32::INFINITY } else { v }).collect();
+        let log = log_reference(&values, channels).expect("the image has positive values");
+        let image = Panorama::new(Equirect::new(width, height), log);
+        let flat = |image: &Panorama| Data::new([height, width, 3], image.pixels().as_flattened().to_vec());
+        case.compare(&format!("out.log_{kind}"), &flat(&image));
+        case.compare(&format!("out.log_mirrored_{kind}"), &flat(&image.mirror()));
     }
-    Some(Compared)
+    Some(Outcome::Compared)
 }
