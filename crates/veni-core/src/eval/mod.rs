@@ -1,3 +1,4 @@
-//! Evaluation: metrics between panoramas.
+//! Metrics and evaluation protocols.
 
 pub mod metrics;
+pub mod reconstruction;

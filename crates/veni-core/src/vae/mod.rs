@@ -3,8 +3,10 @@
 pub mod decoder;
 pub mod encoder;
 pub mod posterior;
+pub mod veni;
 pub mod weights;
 
 pub use decoder::Decoder;
 pub use encoder::{Encoder, FoldedEncoder};
 pub use posterior::Posterior;
+pub use veni::{Encoded, Veni};

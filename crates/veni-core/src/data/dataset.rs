@@ -1,0 +1,188 @@
+//! A folder of panoramas in memory.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::data::exposure::centre_exposure;
+use crate::data::random::{Purpose, permutation, stream};
+use crate::panorama::Panorama;
+use crate::sphere::Equirect;
+use crate::{Error, Result};
+
+/// Where panoramas come from and at which resolution they are used.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DataConfig {
+    /// Folders (or single files). A folder with `train/` and `val/` inside is used as split there; other
+    /// panoramas are split by seed.
+    pub folders: Vec<PathBuf>,
+    /// Columns of the resampled panoramas.
+    pub width: usize,
+    /// Rows of the resampled panoramas.
+    pub height: usize,
+    /// Share of the panoramas that become validation where the folders do not say.
+    pub val_share: f64,
+}
+
+impl Default for DataConfig {
+    fn default() -> Self {
+        Self { folders: Vec::new(), width: 128, height: 64, val_share: 0.1 }
+    }
+}
+
+/// One panorama, ready for use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Item {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// Natural-log radiance at exposure 0, 3·W·H values.
+    pub log_radiance: Vec<f32>,
+    /// What was subtracted: the solid-angle-weighted mean of ln(luminance).
+    pub log_exposure: f32,
+}
+
+impl Item {
+    /// A clean panorama (positive and finite), resampled to `grid`, as log radiance at exposure 0.
+    pub fn new(path: &Path, panorama: &Panorama, grid: Equirect) -> Self {
+        let mut log_radiance = panorama.resample(grid).log().into_flattened();
+        let log_exposure = centre_exposure(grid, &mut log_radiance);
+        Self { path: path.to_path_buf(), log_radiance, log_exposure }
+    }
+
+    /// File name without extension.
+    pub fn name(&self) -> String {
+        self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+}
+
+/// Panoramas of one grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dataset {
+    grid: Equirect,
+    items: Vec<Item>,
+}
+
+/// Training and validation panoramas.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Splits {
+    /// To learn from.
+    pub train: Dataset,
+    /// To choose by; may be empty.
+    pub val: Dataset,
+}
+
+impl Dataset {
+    /// Wraps panoramas that are already log radiance at exposure 0.
+    ///
+    /// # Panics
+    /// If an item does not have 3·W·H values.
+    pub fn new(grid: Equirect, items: Vec<Item>) -> Self {
+        for item in &items {
+            let (have, want) = (item.log_radiance.len(), 3 * grid.len());
+            assert_eq!(have, want, "{}: {have} values on a {} × {} grid", item.path.display(), grid.width, grid.height);
+        }
+        Self { grid, items }
+    }
+
+    /// Reads, cleans and resamples files, in parallel; the order is kept.
+    ///
+    /// # Errors
+    /// The first file (in order) that cannot be read, by name.
+    pub fn load(files: &[PathBuf], grid: Equirect) -> Result<Self> {
+        let items = files.par_iter().map(|path| read_item(path, grid)).collect::<Vec<_>>();
+        Ok(Self { grid, items: items.into_iter().collect::<Result<_>>()? })
+    }
+
+    /// The pixel grid of every item.
+    pub fn grid(&self) -> Equirect {
+        self.grid
+    }
+
+    /// The panoramas, in order.
+    pub fn items(&self) -> &[Item] {
+        &self.items
+    }
+
+    /// Number of panoramas.
+    pub fn len(&self) -> usize {
+        self.items.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.items.is_empty()
+    }
+}
+
+impl Splits {
+    /// Reads what `config` names; `seed` decides the split where the folders do not.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] without folders or without any training panorama; otherwise as [`Dataset::load`].
+    pub fn open(config: &DataConfig, seed: u64) -> Result<Self> {
+        if config.folders.is_empty() {
+            return Err(Error::invalid("no data: name at least one folder of EXR or HDR panoramas"));
+        }
+        if config.width < 2 || config.height < 2 || !(0.0..1.0).contains(&config.val_share) {
+            return Err(Error::invalid(format!(
+                "data: {} × {} pixels with val_share {}: needs at least 2 × 2 and a share in 0..1",
+                config.width, config.height, config.val_share
+            )));
+        }
+        let grid = Equirect::new(config.width, config.height);
+        let (mut train, mut val, mut undecided) = (Vec::new(), Vec::new(), Vec::new());
+        for folder in &config.folders {
+            let [inner_train, inner_val] = ["train", "val"].map(|n| folder.join(n));
+            if inner_train.is_dir() {
+                train.extend(panorama_files(&inner_train)?);
+                if inner_val.is_dir() {
+                    val.extend(panorama_files(&inner_val)?);
+                }
+            } else {
+                undecided.extend(panorama_files(folder)?);
+            }
+        }
+        let take = (undecided.len() as f64 * config.val_share).round() as usize;
+        let order = permutation(&mut stream(seed, Purpose::Split, 0, 0), undecided.len());
+        for (rank, index) in order.into_iter().enumerate() {
+            if rank < take { &mut val } else { &mut train }.push(undecided[index].clone());
+        }
+        train.sort();
+        val.sort();
+        if train.is_empty() {
+            let names: Vec<_> = config.folders.iter().map(|f| f.display().to_string()).collect();
+            return Err(Error::invalid(format!("{}: no .exr or .hdr panorama to train on", names.join(", "))));
+        }
+        Ok(Self { train: Dataset::load(&train, grid)?, val: Dataset::load(&val, grid)? })
+    }
+}
+
+/// The `.exr` and `.hdr` files directly inside `folder`, sorted by name; a file stands for itself.
+///
+/// # Errors
+/// [`Error::Io`] if the folder cannot be listed.
+pub fn panorama_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    if folder.is_file() {
+        return Ok(vec![folder.to_path_buf()]);
+    }
+    let entries = fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
+    let mut files = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|e| Error::io(folder, "list", e))?.path();
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        if (extension == "exr" || extension == "hdr") && path.is_file() {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn read_item(path: &Path, grid: Equirect) -> Result<Item> {
+    let mut panorama = Panorama::read(path)?;
+    panorama.sanitise().map_err(|e| e.in_file(path))?;
+    Ok(Item::new(path, &panorama, grid))
+}

@@ -1,0 +1,221 @@
+//! What one step works on, prepared on the host while the previous step computes.
+
+use crate::data::random::{Purpose, below, normal, permutation, stream, uniform};
+use crate::data::{AugmentConfig, Dataset};
+use crate::sphere::{Equirect, Stripes};
+use crate::train::config::{LossGrid, Order, TrainConfig};
+
+/// The numbers of one step, row-major, channels last.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Batch {
+    /// Number of the update, from 1.
+    pub step: u64,
+    /// B, panoramas.
+    pub images: usize,
+    /// Directions of the encoder's samples [B, T, P, 3]; each panorama has its own yaw.
+    pub stripe_directions: Vec<f32>,
+    /// Log radiance there [B, T, P, 3].
+    pub stripe_samples: Vec<f32>,
+    /// Rows and columns of the loss grid.
+    pub loss_size: [usize; 2],
+    /// Directions of the loss grid [R, 3], R rows × columns, shared by all panoramas.
+    pub loss_directions: Vec<f32>,
+    /// Target log radiance [B, rows, columns, 3].
+    pub target: Vec<f32>,
+    /// ε of the variational sample [B, N, 3].
+    pub noise: Vec<f32>,
+}
+
+/// Prepares batches. A batch is a pure function of the configuration and its step.
+#[derive(Debug)]
+pub struct Batches<'a> {
+    train: &'a Dataset,
+    augment: AugmentConfig,
+    order: Order,
+    loss_grid: LossGrid,
+    seed: u64,
+    batch: usize,
+    latent_vectors: usize,
+    stripes: Stripes,
+    directions: Vec<[f32; 3]>,
+}
+
+impl<'a> Batches<'a> {
+    /// Batches of `train` as `config` says, sampled on `stripes`.
+    pub fn new(config: &TrainConfig, stripes: Stripes, train: &'a Dataset) -> Self {
+        Self {
+            train,
+            augment: config.augment.clone(),
+            order: config.order,
+            loss_grid: config.loss_grid,
+            seed: config.seed,
+            batch: config.batch,
+            latent_vectors: config.model.latent_vectors,
+            directions: stripes.directions(),
+            stripes,
+        }
+    }
+
+    /// The batch of update `step` (from 1).
+    pub fn prepare(&self, step: u64) -> Batch {
+        let grid = self.train.grid();
+        let loss = LossView::new(self.loss_grid, grid, &mut stream(self.seed, Purpose::Sampling, step, 0));
+        let mut batch = Batch {
+            step,
+            images: self.batch,
+            stripe_directions: Vec::new(),
+            stripe_samples: Vec::new(),
+            loss_size: loss.size(),
+            loss_directions: loss.directions(),
+            target: Vec::new(),
+            noise: Vec::with_capacity(3 * self.batch * self.latent_vectors),
+        };
+        for slot in 0..self.batch {
+            let image = self.augmented(self.choice(step, slot), step, slot as u64);
+            let yaw = std::f64::consts::TAU * uniform(&mut stream(self.seed, Purpose::Sampling, step, 1 + slot as u64));
+            // the grid is turned, not the image: samples and directions lie at −yaw, in the image's own frame
+            let samples = self.stripes.gather_turned(grid, yaw).sample(image.as_chunks().0);
+            batch.stripe_samples.extend(samples.into_flattened());
+            let (sin, cos) = yaw.sin_cos();
+            let turned = |[x, y, z]: &[f32; 3]| {
+                let (x, y) = (f64::from(*x), f64::from(*y));
+                [(cos * x + sin * y) as f32, (cos * y - sin * x) as f32, *z]
+            };
+            batch.stripe_directions.extend(self.directions.iter().flat_map(turned));
+            loss.extend_target(&image, &mut batch.target);
+            let mut noise = stream(self.seed, Purpose::Noise, step, slot as u64);
+            batch.noise.extend((0..3 * self.latent_vectors).map(|_| normal(&mut noise) as f32));
+        }
+        batch
+    }
+
+    /// Panorama `index` of the training set as slot `slot` of update `step` sees it.
+    pub fn augmented(&self, index: usize, step: u64, slot: u64) -> Vec<f32> {
+        let items = self.train.items();
+        let mut rng = stream(self.seed, Purpose::Augment, step, slot);
+        let image = &items[index].log_radiance;
+        self.augment.apply(self.train.grid(), image, &mut rng, |rng| &items[below(rng, items.len())].log_radiance)
+    }
+
+    fn choice(&self, step: u64, slot: usize) -> usize {
+        let n = self.train.len();
+        match self.order {
+            Order::Replacement => below(&mut stream(self.seed, Purpose::Order, step, slot as u64), n),
+            Order::Shuffle => {
+                let drawn = (step - 1) as usize * self.batch + slot;
+                permutation(&mut stream(self.seed, Purpose::Order, (drawn / n) as u64, u64::MAX), n)[drawn % n]
+            }
+        }
+    }
+}
+
+/// The directions of one step's losses, and how to take a target on them.
+struct LossView {
+    grid: Equirect,
+    kind: LossGrid,
+    /// Row and column of the first pixel, for [`LossGrid::Strided`].
+    offset: [usize; 2],
+}
+
+impl LossView {
+    fn new(kind: LossGrid, grid: Equirect, rng: &mut impl rand::Rng) -> Self {
+        let offset = match kind {
+            LossGrid::Strided { factor } => [below(rng, factor), below(rng, factor)],
+            LossGrid::Full | LossGrid::Averaged { .. } => [0; 2],
+        };
+        Self { grid, kind, offset }
+    }
+
+    fn size(&self) -> [usize; 2] {
+        [self.grid.height, self.grid.width].map(|n| n / self.kind.factor())
+    }
+
+    fn directions(&self) -> Vec<f32> {
+        let [rows, columns] = self.size();
+        match self.kind {
+            LossGrid::Full | LossGrid::Averaged { .. } => {
+                Equirect::new(columns, rows).directions().into_iter().flatten().collect()
+            }
+            LossGrid::Strided { factor } => (0..rows)
+                .flat_map(|j| (0..columns).map(move |i| (j, i)))
+                .flat_map(|(j, i)| self.grid.direction(self.offset[1] + i * factor, self.offset[0] + j * factor))
+                .collect(),
+        }
+    }
+
+    fn extend_target(&self, image: &[f32], target: &mut Vec<f32>) {
+        let ([rows, columns], width) = (self.size(), self.grid.width);
+        match self.kind {
+            LossGrid::Full => target.extend_from_slice(image),
+            LossGrid::Strided { factor } => {
+                for j in (0..rows).map(|j| self.offset[0] + j * factor) {
+                    for i in (0..columns).map(|i| self.offset[1] + i * factor) {
+                        target.extend_from_slice(&image[3 * (j * width + i)..][..3]);
+                    }
+                }
+            }
+            LossGrid::Averaged { factor } => {
+                for j in 0..rows {
+                    let weights: Vec<f64> = (0..factor).map(|k| self.grid.solid_angle(j * factor + k)).collect();
+                    let total: f64 = weights.iter().sum::<f64>() * factor as f64;
+                    for i in 0..columns {
+                        for c in 0..3 {
+                            let mut sum = 0.0;
+                            for (k, weight) in weights.iter().enumerate() {
+                                let row = (j * factor + k) * width + i * factor;
+                                sum += weight * (0..factor).map(|l| f64::from(image[3 * (row + l) + c])).sum::<f64>();
+                            }
+                            target.push((sum / total) as f32);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Equirect = Equirect { width: 8, height: 4 };
+
+    fn view(kind: LossGrid, step: u64) -> LossView {
+        LossView::new(kind, GRID, &mut stream(3, Purpose::Sampling, step, 0))
+    }
+
+    /// Each pixel's value is a linear function of its index, so positions can be read off the target.
+    fn ramp() -> Vec<f32> {
+        (0..GRID.len()).flat_map(|p| [p as f32, p as f32 + 0.25, p as f32 + 0.5]).collect()
+    }
+
+    #[test]
+    fn strided_targets_and_directions_belong_to_the_same_pixels() {
+        let mut seen = std::collections::BTreeSet::new();
+        for step in 0..40 {
+            let view = view(LossGrid::Strided { factor: 2 }, step);
+            let mut target = Vec::new();
+            view.extend_target(&ramp(), &mut target);
+            let directions = view.directions();
+            assert_eq!((target.len(), directions.len()), (24, 24));
+            for (pixel, direction) in target.chunks_exact(3).zip(directions.chunks_exact(3)) {
+                let index = pixel[0] as usize;
+                assert_eq!(direction, GRID.direction(index % 8, index / 8));
+                seen.insert(index);
+            }
+        }
+        assert_eq!(seen.len(), GRID.len(), "every pixel has its turn");
+    }
+
+    #[test]
+    fn averages_are_by_solid_angle() {
+        let mut target = Vec::new();
+        view(LossGrid::Averaged { factor: 2 }, 0).extend_target(&ramp(), &mut target);
+        let (top, below) = (GRID.solid_angle(0), GRID.solid_angle(1));
+        let expected = (top * 0.5 + below * 8.5) / (top + below);
+        assert!((f64::from(target[0]) - expected).abs() < 1e-6);
+        let mut constant = Vec::new();
+        view(LossGrid::Averaged { factor: 4 }, 0).extend_target(&[2.5; 96], &mut constant);
+        assert_eq!(constant, [2.5; 6]);
+    }
+}

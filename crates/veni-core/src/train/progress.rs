@@ -1,0 +1,68 @@
+//! What a run tells whoever started it. The library prints nothing.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::eval::reconstruction::MeanScores;
+
+/// One update, as written to `metrics.jsonl` and shown to the user.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StepReport {
+    /// Number of the update, from 1.
+    pub step: u64,
+    /// Weighted sum of the losses.
+    pub loss: f64,
+    /// Each loss part, times its weight.
+    pub parts: BTreeMap<&'static str, f64>,
+    /// Learning rate of each group.
+    pub learning_rate: BTreeMap<&'static str, f64>,
+    /// Gradient norm of each group before clipping.
+    pub gradient_norm: BTreeMap<&'static str, f64>,
+    /// Wall-clock seconds of this update.
+    pub seconds: f64,
+    /// Panoramas per second in this update.
+    pub images_per_second: f64,
+}
+
+/// A validation with the averaged weights.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ValidationReport {
+    /// After how many updates.
+    pub step: u64,
+    /// Mean over the validation panoramas, auto-encoder pass; absent without any.
+    pub val: Option<MeanScores>,
+    /// Mean over the validated training panoramas.
+    pub train: Option<MeanScores>,
+    /// Whether this became `model.safetensors`.
+    pub best: bool,
+}
+
+/// Receives reports. Every method does nothing unless it is written.
+pub trait Progress {
+    /// The run begins, or continues after `done` of `total` updates.
+    fn start(&mut self, done: u64, total: u64) {
+        let _ = (done, total);
+    }
+
+    /// An update has been made; `remaining` is the estimated time to the last one, in seconds.
+    fn step(&mut self, report: &StepReport, remaining: f64) {
+        let _ = (report, remaining);
+    }
+
+    /// A validation has been made.
+    fn validation(&mut self, report: &ValidationReport) {
+        let _ = report;
+    }
+
+    /// A file of the run was written.
+    fn wrote(&mut self, path: &std::path::Path) {
+        let _ = path;
+    }
+}
+
+/// Nobody is listening.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {}
