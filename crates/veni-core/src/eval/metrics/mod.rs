@@ -34,7 +34,13 @@ pub struct Scores {
 ///
 /// # Panics
 /// If a length is not height · width · 3.
-pub fn scores(prediction: &[f32], target: &[f32], height: usize, width: usize, alignment: Alignment) -> Scores {
+pub fn scores(
+    prediction: &[f32],
+    target: &[f32],
+    height: usize,
+    width: usize,
+    alignment: Alignment,
+) -> Scores {
     let shape = [height, width, 3];
     let aligned = alignment.apply(prediction, target, height);
     let p: Vec<f64> = aligned.iter().map(|v| v.exp()).collect();

@@ -4,7 +4,9 @@ const H: usize = 12;
 const W: usize = 24;
 
 fn image(phase: f64) -> Vec<f32> {
-    (0..H * W * 3).map(|k| ((0.31 * k as f64 + phase).sin() * 1.5 + (0.011 * k as f64).cos()) as f32).collect()
+    (0..H * W * 3)
+        .map(|k| ((0.31 * k as f64 + phase).sin() * 1.5 + (0.011 * k as f64).cos()) as f32)
+        .collect()
 }
 
 #[test]

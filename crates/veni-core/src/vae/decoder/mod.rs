@@ -87,7 +87,12 @@ impl Decoder {
     ///
     /// # Panics
     /// If a shape is none of these.
-    pub fn forward_conditioned(&self, latent: Tensor<3>, condition: Tensor<2>, directions: Tensor<3>) -> Tensor<3> {
+    pub fn forward_conditioned(
+        &self,
+        latent: Tensor<3>,
+        condition: Tensor<2>,
+        directions: Tensor<3>,
+    ) -> Tensor<3> {
         let ([_, n, three], [_, _, coordinates]) = (latent.dims(), directions.dims());
         assert!(
             n == self.latent_vectors() && three == 3 && coordinates == 3,

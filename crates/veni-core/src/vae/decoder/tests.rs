@@ -50,7 +50,8 @@ fn turning_or_mirroring_the_latent_turns_or_mirrors_the_image() {
             let (s, c) = angle.sin_cos();
             for sign in [1.0, -1.0] {
                 let m = matrix([[c, s, 0.0], [-s * sign, c * sign, 0.0], [0.0, 0.0, 1.0]], &device);
-                let turned = decoder.forward(rotate(latent(&device), m.clone()), directions(&device).matmul(m));
+                let turned =
+                    decoder.forward(rotate(latent(&device), m.clone()), directions(&device).matmul(m));
                 let difference = largest_difference(&expected, &turned);
                 assert!(difference < 1e-5, "{form:?}, angle {angle}, sign {sign}: {difference}");
             }
