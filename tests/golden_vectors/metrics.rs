@@ -38,7 +38,9 @@ fn wide(data: &Data) -> Vec<f64> {
 
 /// [1, C, H, W] to [H, W, C].
 fn channels_last(data: &Data) -> (Vec<f64>, [usize; 3]) {
-    let [1, channels, height, width] = data.shape[..] else { panic!("{:?} is not one planar image", data.shape) };
+    let [1, channels, height, width] = data.shape[..] else {
+        panic!("{:?} is not one planar image", data.shape)
+    };
     let plane = height * width;
     let values = (0..plane).flat_map(|k| (0..channels).map(move |c| f64::from(data.values[c * plane + k])));
     (values.collect(), [height, width, channels])
@@ -63,7 +65,8 @@ fn images(case: &Case) {
 
     scalar("out.scale", &|| log_factor(&prediction.values, &target.values));
     scalar("out.train_psnr", &|| psnr(&aligned, &gt));
-    let [narrow_aligned, narrow_gt] = [&aligned, &gt].map(|x| x.iter().map(|v| *v as f32).collect::<Vec<_>>());
+    let [narrow_aligned, narrow_gt] =
+        [&aligned, &gt].map(|x| x.iter().map(|v| *v as f32).collect::<Vec<_>>());
     scalar("out.pred_q98", &|| f64::from(quantile(&narrow_aligned, 0.98)));
     scalar("out.gt_q98", &|| f64::from(quantile(&narrow_gt, 0.98)));
     image("out.pred_srgb", &|| srgb_q98(&narrow_aligned).0);

@@ -41,8 +41,11 @@ fn a_perturbed_weight_is_noticed() {
         // The element on which the outputs depend most, by the file's own gradients.
         let gradients = case.tensors.iter().filter_map(|(name, g)| Some((name.strip_prefix("grad.")?, g)));
         let parameters = gradients.filter(|(name, _)| name.starts_with("param.") && case.expects(name));
-        let elements = parameters.flat_map(|(name, g)| g.values.iter().enumerate().map(move |(i, v)| (name, i, *v)));
-        let Some((name, index, _)) = elements.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else { continue };
+        let elements =
+            parameters.flat_map(|(name, g)| g.values.iter().enumerate().map(move |(i, v)| (name, i, *v)));
+        let Some((name, index, _)) = elements.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else {
+            continue;
+        };
         let name = name.to_owned();
         if !matches!(run_case(&case, &device), Verdict::Passed(_)) {
             continue;

@@ -107,10 +107,10 @@ impl Decoder {
         let mut x = first.forward(input::encode(&self.input, latent, input::basis(directions), offset));
         let mut previous = first;
         for (layer, attention) in rest.iter().zip(attention) {
-            x = layer.forward(previous.into_next(x, attention));
+            x = layer.forward(previous.next_input(x, attention));
             previous = layer;
         }
-        previous.into_output(x, &self.output)
+        previous.read_out(x, &self.output)
     }
 }
 
