@@ -12,6 +12,7 @@ use rand::SeedableRng;
 use serde_json::Value;
 use veni::model::{EncoderConfig, Pooling, Reduction, VectorLayer, VnReluForm};
 use veni::vae::Encoder;
+use veni::vae::weights::Weights;
 
 /// See [`Family`](crate::Family).
 pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
@@ -102,6 +103,11 @@ impl Official {
     /// Compares the gradients of the weights that the case records.
     pub(crate) fn compare_gradients(&self, case: &Case, encoder: &Encoder, gradients: &Gradients) {
         self.bindings.compare_gradients(case, encoder, gradients);
+    }
+
+    /// Compares our weights (or gradients) by our names with the records under `<record><key>`.
+    pub(crate) fn compare_records(&self, case: &Case, record: &str, ours: &Weights) {
+        self.bindings.compare_records(case, record, ours);
     }
 
     /// Directions as their network sees them.

@@ -118,6 +118,11 @@ impl Sizes {
         (all, dead)
     }
 
+    /// Keys of the authors' weights that have no effect, under `prefix`.
+    pub(crate) fn dead_keys(&self, prefix: &str) -> Vec<String> {
+        self.bindings().1.into_iter().map(|dead| format!("{prefix}{}", dead.key)).collect()
+    }
+
     /// Width of what the value maps read.
     fn condition(&self) -> usize {
         3 * self.n * if self.encoded_condition { 5 } else { 1 }
@@ -165,30 +170,34 @@ pub(crate) fn build(case: &Case, prefix: &str, device: &Device) -> Decoder {
 
 /// Compares the gradients of every parameter that the case records under `grad.param.<prefix><key>`.
 pub(crate) fn compare_gradients(case: &Case, prefix: &str, decoder: &Decoder, gradients: &Gradients) {
-    let sizes = Sizes::of(case);
-    let ours: Weights = weights::gradients(decoder, "", gradients);
+    let ours = weights::gradients(decoder, "", gradients);
+    compare_records(case, &Sizes::of(case), &format!("grad.param.{prefix}"), &ours);
+}
+
+/// Compares `ours` (by our names; absent: zeros) with what the case records under `<record><key>`. What ours
+/// has not, a query or a key, can only be zero: as a gradient it is compared as such.
+pub(crate) fn compare_records(case: &Case, sizes: &Sizes, record: &str, ours: &Weights) {
     let (bindings, dead) = sizes.bindings();
     for binding in bindings {
-        let name = format!("grad.param.{prefix}{}", binding.key);
+        let name = format!("{record}{}", binding.key);
         if !case.expects(&name) {
             continue;
         }
         let zero = || Weight { shape: vec![], data: vec![0.0; binding.shape.iter().product()] };
-        let mut gradient = ours.get(&binding.ours).cloned().unwrap_or_else(zero);
+        let mut values = ours.get(&binding.ours).cloned().unwrap_or_else(zero);
         if binding.ours == "input.weight" {
             let rows = sizes.used_rows();
-            gradient.data = gradient.data[rows.start * sizes.hidden..rows.end * sizes.hidden].to_vec();
+            values.data = values.data[rows.start * sizes.hidden..rows.end * sizes.hidden].to_vec();
         }
         let mut shape = binding.shape.clone();
         if binding.transposed {
             shape.reverse();
         }
-        let gradient = Data::new(shape, gradient.data);
-        case.compare(&name, &if binding.transposed { gradient.transposed() } else { gradient });
+        let values = Data::new(shape, values.data);
+        case.compare(&name, &if binding.transposed { values.transposed() } else { values });
     }
-    // No query and no key exists here: our gradient with respect to them is nothing but zero.
-    for Dead { key } in dead {
-        let name = format!("grad.param.{prefix}{key}");
+    for Dead { key } in dead.into_iter().filter(|_| record.starts_with("grad.")) {
+        let name = format!("{record}{key}");
         if let Some(golden) = case.get(&name) {
             case.compare(&name, &Data::new(golden.shape.clone(), vec![0.0; golden.values.len()]));
         }

@@ -142,9 +142,19 @@ impl Bindings {
 
     /// Compares the gradients that the case records under `grad.param.<key>`.
     pub(crate) fn compare_gradients<M: Module>(&self, case: &Case, module: &M, gradients: &Gradients) {
-        let ours: Weights = weights::gradients(module, "", gradients);
+        self.compare_records(case, "grad.param.", &weights::gradients(module, "", gradients));
+    }
+
+    /// Compares `ours` (by our names; absent: zeros) with what the case records under `<record><key>`.
+    pub(crate) fn compare_records(&self, case: &Case, record: &str, ours: &Weights) {
+        for (key, shape) in &self.zeros {
+            let name = format!("{record}{key}");
+            if case.expects(&name) {
+                case.compare(&name, &Data::new(shape.clone(), vec![0.0; shape.iter().product()]));
+            }
+        }
         for Binding { key, shape, view, order, ours: name } in &self.parameters {
-            let record = format!("grad.param.{key}");
+            let record = format!("{record}{key}");
             if !case.expects(&record) {
                 continue;
             }

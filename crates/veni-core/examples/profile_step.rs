@@ -2,6 +2,8 @@
 use std::time::Instant;
 use veni_core::data::*; use veni_core::train::{batch::*,presets::*,optimiser::*,loss::Loss,step::*}; use veni_core::vae::Veni;
 use rand::SeedableRng;
+#[global_allocator]
+static A: mimalloc::MiMalloc = mimalloc::MiMalloc;
 fn main(){
     let mut a=std::env::args().skip(1); let data=a.next().unwrap(); let sets:Vec<String>=a.collect();
     let mut c=Preset::Small.config(9).with_overrides(&sets).unwrap(); c.data.folders=vec![data.into()]; c.check().unwrap();

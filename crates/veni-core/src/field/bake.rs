@@ -7,8 +7,11 @@ use rayon::prelude::*;
 use super::Field;
 use super::aligned::Aligned;
 use super::block::Blocks;
+use super::single::Single;
 use crate::sphere::Equirect;
 
+/// So many directions are faster one by one than as a block with idle lanes.
+const FEW: usize = 6;
 /// Directions of one task: a few blocks, so that all cores finish together.
 const TASK: usize = 192;
 /// Pixels that are decoded before they are handed over: enough to keep all cores busy, and bounded (3 MB).
@@ -58,8 +61,12 @@ impl Field {
     }
 
     fn run(&self, directions: &[[f32; 3]], out: &mut [[f32; 3]], log: bool, scratch: &mut Aligned) {
-        let (weights, folded) = (&*self.weights, &*self.folded);
-        pulp::Arch::new().dispatch(Blocks { weights, folded, directions, out, log, scratch });
+        let (weights, folded, arch) = (&*self.weights, &*self.folded, pulp::Arch::new());
+        if directions.len() <= FEW {
+            arch.dispatch(Single { weights, folded, directions, out, log });
+        } else {
+            arch.dispatch(Blocks { weights, folded, directions, out, log, scratch });
+        }
     }
 
     /// Linear RGB radiance of every pixel centre of `grid`, row-major from the top, on all cores.
@@ -99,14 +106,13 @@ impl Field {
         let room = || (Aligned::default(), Vec::with_capacity(TASK));
         tasks.for_each_init(room, |(scratch, directions), (task, out)| {
             directions.clear();
-            let from = first * grid.width + task * TASK;
-            directions.extend((from..from + out.len()).map(|pixel| columns.direction(grid, pixel)));
+            columns.directions(grid, first * grid.width + task * TASK, out.len(), directions);
             self.run(directions, out, false, scratch);
         });
     }
 }
 
-/// (sin φ, cos φ) of every column, so that a pixel's direction costs no trigonometry of its own column.
+/// (sin φ, cos φ) of every column, so that a pixel's direction costs two products.
 struct Columns(Vec<(f64, f64)>);
 
 impl Columns {
@@ -114,10 +120,16 @@ impl Columns {
         Self((0..grid.width).map(|column| grid.azimuth(column).sin_cos()).collect())
     }
 
-    /// To the bit [`Equirect::direction`].
-    fn direction(&self, grid: Equirect, pixel: usize) -> [f32; 3] {
-        let (sin_t, cos_t) = grid.polar(pixel / grid.width).sin_cos();
-        let (sin_p, cos_p) = self.0[pixel % grid.width];
-        [(sin_t * cos_p) as f32, (sin_t * sin_p) as f32, cos_t as f32]
+    /// Appends the directions of `count` pixels from row-major index `from` on: to the bit
+    /// [`Equirect::direction`].
+    fn directions(&self, grid: Equirect, from: usize, count: usize, directions: &mut Vec<[f32; 3]>) {
+        let end = from + count;
+        for row in from / grid.width..end.div_ceil(grid.width) {
+            let start = row * grid.width;
+            let columns = from.max(start) - start..end.min(start + grid.width) - start;
+            let (sin_t, cos_t) = grid.polar(row).sin_cos();
+            let direction = |(s, c): &(f64, f64)| [(sin_t * c) as f32, (sin_t * s) as f32, cos_t as f32];
+            directions.extend(self.0[columns].iter().map(direction));
+        }
     }
 }

@@ -124,7 +124,9 @@ fn encode<S: Simd>(
     for (j, out) in inputs.zip(out) {
         for v in 0..VECTORS {
             let (value, turns) = match folded.vectors.get(j) {
-                Some([a, b]) => inner_product(simd, [*a, *b], [direction[0][v], direction[1][v]]),
+                Some(z) => {
+                    inner_product(simd, z.map(|c| simd.splat_f32s(c)), [direction[0][v], direction[1][v]])
+                }
                 None => [direction[2 + j - n][v]; 2].into(),
             };
             let [sin1, cos1] = math::sin_cos_turns(simd, turns);
@@ -140,11 +142,10 @@ fn encode<S: Simd>(
 /// ⟨z, d⟩ rounded, and the same in turns modulo 1 with an error that does not grow with |z|: the products'
 /// rounding errors are recovered by fused multiply-add, and whole turns are dropped before adding.
 #[inline(always)]
-fn inner_product<S: Simd>(simd: S, z: [f32; 2], d: [S::f32s; 2]) -> (S::f32s, S::f32s) {
+pub(super) fn inner_product<S: Simd>(simd: S, z: [S::f32s; 2], d: [S::f32s; 2]) -> (S::f32s, S::f32s) {
     let [(a, a_low), (b, b_low)] = [0, 1].map(|k| {
-        let z = simd.splat_f32s(z[k]);
-        let product = simd.mul_f32s(z, d[k]);
-        (product, simd.mul_add_f32s(z, d[k], simd.neg_f32s(product)))
+        let product = simd.mul_f32s(z[k], d[k]);
+        (product, simd.mul_add_f32s(z[k], d[k], simd.neg_f32s(product)))
     });
     let high = simd.add_f32s(math::fraction(simd, a), math::fraction(simd, b));
     (simd.add_f32s(a, b), simd.add_f32s(high, simd.add_f32s(a_low, b_low)))

@@ -16,6 +16,7 @@ mod bake;
 mod block;
 mod condition;
 mod math;
+mod single;
 mod weights;
 
 use std::sync::Arc;

@@ -37,7 +37,12 @@ impl Matrix {
 
     /// Panels of `inputs` rows each.
     pub(super) fn panels(&self) -> std::slice::ChunksExact<'_, [f32; PANEL]> {
-        self.data.as_slice().as_chunks::<PANEL>().0.chunks_exact(self.inputs)
+        self.rows().chunks_exact(self.inputs)
+    }
+
+    /// All panels, one after the other.
+    pub(super) fn rows(&self) -> &[[f32; PANEL]] {
+        self.data.as_slice().as_chunks::<PANEL>().0
     }
 }
 

@@ -11,7 +11,7 @@ use crate::{Error, Result};
 
 /// An append-only log of records that have a `step`.
 #[derive(Debug)]
-pub struct MetricsLog {
+pub(super) struct MetricsLog {
     path: PathBuf,
     file: File,
 }
@@ -22,7 +22,7 @@ impl MetricsLog {
     ///
     /// # Errors
     /// [`Error::Io`] if the file cannot be read or written.
-    pub fn open(path: &Path, step: u64) -> Result<Self> {
+    pub(super) fn open(path: &Path, step: u64) -> Result<Self> {
         if path.exists() {
             let lines = kept(path, step)?;
             write_atomic(path, Overwrite::Replace, |out| {
@@ -38,7 +38,7 @@ impl MetricsLog {
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be written.
-    pub fn append(&mut self, record: &impl Serialize) -> Result<()> {
+    pub(super) fn append(&mut self, record: &impl Serialize) -> Result<()> {
         let mut line = serde_json::to_vec(record).map_err(|e| Error::invalid(format!("metrics record: {e}")))?;
         line.push(b'\n');
         // one write per line: a kill leaves at most one torn line

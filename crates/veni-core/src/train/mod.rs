@@ -12,5 +12,4 @@ mod preview;
 pub mod progress;
 pub mod run;
 pub mod schedule;
-pub mod standin;
 pub mod step;

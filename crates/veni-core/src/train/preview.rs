@@ -20,7 +20,7 @@ const GAP: u32 = 2;
 ///
 /// # Panics
 /// If rows have different lengths or an image another size.
-pub fn write(path: &Path, grid: Equirect, rows: &[Vec<Vec<f32>>]) -> Result<()> {
+pub(super) fn write(path: &Path, grid: Equirect, rows: &[Vec<Vec<f32>>]) -> Result<()> {
     let columns = rows.first().map_or(0, Vec::len) as u32;
     let (w, h) = (grid.width as u32, grid.height as u32);
     let mut sheet = RgbImage::new(columns * (w + GAP), rows.len() as u32 * (h + GAP));

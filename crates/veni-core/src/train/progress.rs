@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::eval::reconstruction::Scores;
+use crate::eval::reconstruction::MeanScores;
 
 /// One update, as written to `metrics.jsonl` and shown to the user.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -31,9 +31,9 @@ pub struct ValidationReport {
     /// After how many updates.
     pub step: u64,
     /// Mean over the validation panoramas, auto-encoder pass; absent without any.
-    pub val: Option<Scores>,
+    pub val: Option<MeanScores>,
     /// Mean over the validated training panoramas.
-    pub train: Option<Scores>,
+    pub train: Option<MeanScores>,
     /// Whether this became `model.safetensors`.
     pub best: bool,
 }

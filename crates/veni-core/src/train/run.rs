@@ -23,6 +23,7 @@ use serde::Serialize;
 
 use crate::data::random::{Purpose, stream};
 use crate::data::{Dataset, Splits};
+use crate::eval::metrics::Alignment;
 use crate::eval::reconstruction::Reconstruction;
 use crate::latent::{Latent, Prior};
 use crate::model::{Model, ModelInfo, Training};
@@ -242,7 +243,7 @@ impl Trainer {
         let subset = Dataset::new(self.splits.train.grid(), self.splits.train.items()[..subset].to_vec());
         let mean = |set: &Dataset| match set.is_empty() {
             true => Ok(None),
-            false => Reconstruction::autoencoder(&veni, set).map(|r| Some(r.mean)),
+            false => Reconstruction::autoencoder(&veni, set, Alignment::LogFactor).map(|r| Some(r.mean)),
         };
         let (val, train) = (mean(&self.splits.val)?, mean(&subset)?);
         let step = self.steps_done();

@@ -1,0 +1,34 @@
+//! The CPU decoder with filler weights: `cargo bench -p veni-core --no-default-features --bench field`.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use veni_core::latent::{Latent, Prior};
+use veni_core::model::{Model, ModelConfig};
+use veni_core::sphere::Equirect;
+
+#[allow(clippy::unwrap_used, reason = "a bench has no caller to report to")]
+fn field(c: &mut Criterion) {
+    for n in [9, 100] {
+        let mut group = c.benchmark_group(format!("D={}", 3 * n));
+        let model = Model::filler(&ModelConfig::decode_only(n), 1).unwrap();
+        let decoder = model.decoder();
+        let latent = Latent::from_seed(&Prior::standard(n), 1);
+        let field = decoder.condition(&latent).unwrap();
+        group.bench_function("pack", |b| b.iter(|| black_box(&model).decoder()));
+        group.bench_function("condition", |b| b.iter(|| decoder.condition(black_box(&latent)).unwrap()));
+        group.bench_function("radiance", |b| b.iter(|| field.radiance(black_box([0.6, 0.0, 0.8]))));
+        group.sample_size(10);
+        for (width, height) in [(128, 64), (1024, 512)] {
+            let grid = Equirect::new(width, height);
+            group.throughput(Throughput::Elements(grid.len() as u64));
+            group.bench_function(format!("bake {width}x{height}"), |b| {
+                b.iter(|| black_box(&field).bake(grid))
+            });
+        }
+        group.finish();
+    }
+}
+
+criterion_group!(benches, field);
+criterion_main!(benches);

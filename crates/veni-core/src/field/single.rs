@@ -1,0 +1,192 @@
+//! The network for one direction: lanes run over outputs instead of directions.
+//!
+//! It reads the weights once, at the speed of the second-level cache, where a block of one would do all the
+//! work of a full block. Every sum is taken in the order of `block`, so the bits are the same.
+
+use pulp::{Simd, WithSimd};
+
+use super::block::{EPSILON, PARTIAL, inner_product};
+use super::weights::{Matrix, PANEL, Weights};
+use super::{Folded, math};
+
+/// Panels that run side by side: enough independent sums to hide the latency of multiply-add.
+const SIDE: usize = 8;
+
+/// Work for one thread: a few directions, one by one.
+pub(super) struct Single<'a> {
+    pub(super) weights: &'a Weights,
+    pub(super) folded: &'a Folded,
+    pub(super) directions: &'a [[f32; 3]],
+    /// As many as directions.
+    pub(super) out: &'a mut [[f32; 3]],
+    /// Log radiance instead of radiance.
+    pub(super) log: bool,
+}
+
+impl WithSimd for Single<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { weights, folded, directions, out, log } = self;
+        let mut features = vec![0.0; 5 * (weights.latent_vectors + 2)];
+        let (mut x, mut y) = (vec![0.0; weights.padded()], vec![0.0; weights.padded()]);
+        for (direction, out) in directions.iter().zip(out) {
+            encode(simd, folded, *direction, &mut features);
+            let rgb = network::<S>(weights, folded, &features, &mut x, &mut y);
+            *out = rgb.map(|value| {
+                let value = value + folded.log_exposure;
+                if log { value } else { first(math::exp(simd, simd.splat_f32s(value))) }
+            });
+        }
+    }
+}
+
+#[inline(always)]
+fn first<V: pulp::bytemuck::Pod>(vector: V) -> f32 {
+    bytemuck::cast_slice::<V, f32>(&[vector])[0]
+}
+
+/// Five features of each directional input, as in `block`, a lane per input.
+#[inline(always)]
+fn encode<S: Simd>(simd: S, folded: &Folded, direction: [f32; 3], features: &mut [f32]) {
+    let [x, y, z] = direction.map(|c| simd.splat_f32s(c));
+    let radius = simd.sqrt_f32s(simd.mul_add_f32s(x, x, simd.mul_f32s(y, y)));
+    let lanes = S::F32_LANES;
+    let mut write = |from: usize, count: usize, value: S::f32s, turns: S::f32s| {
+        let [sin1, cos1] = math::sin_cos_turns(simd, turns);
+        let [sin4, cos4] = math::sin_cos_turns(simd, simd.mul_f32s(turns, simd.splat_f32s(4.0)));
+        let columns = [sin1, sin4, cos1, cos4, value];
+        let columns: &[f32] = bytemuck::cast_slice(&columns);
+        for i in 0..count {
+            for k in 0..5 {
+                features[5 * (from + i) + k] = columns[k * lanes + i];
+            }
+        }
+    };
+    for (group, vectors) in folded.vectors.chunks(lanes).enumerate() {
+        let mut both = [simd.splat_f32s(0.0); 2];
+        let flat: &mut [f32] = bytemuck::cast_slice_mut(&mut both);
+        for (i, [a, b]) in vectors.iter().enumerate() {
+            (flat[i], flat[lanes + i]) = (*a, *b);
+        }
+        let (value, turns) = inner_product(simd, both, [x, y]);
+        write(group * lanes, vectors.len(), value, turns);
+    }
+    let n = folded.vectors.len();
+    write(n, 1, z, z);
+    write(n + 1, 1, radius, radius);
+}
+
+#[inline(always)]
+fn network<S: Simd>(
+    weights: &Weights,
+    folded: &Folded,
+    features: &[f32],
+    x: &mut [f32],
+    y: &mut [f32],
+) -> [f32; 3] {
+    let hidden = weights.hidden;
+    for (i, chunk) in weights.input.iter().enumerate() {
+        let features = &features[5 * chunk.inputs.start..];
+        if i == 0 {
+            product::<S, false, false>(&chunk.weight, &folded.input_bias, features, x);
+        } else {
+            product::<S, true, false>(&chunk.weight, &folded.no_bias, features, x);
+        }
+    }
+    for (layer, shift) in weights.layers.iter().zip(&folded.shift) {
+        normalise::<S>(&mut x[..hidden], &layer.gamma1, &layer.beta1);
+        product::<S, false, true>(&layer.ff1, &layer.ff1_bias, x, y);
+        product::<S, true, false>(&layer.ff2, &layer.ff2_bias, y, x);
+        normalise::<S>(&mut x[..hidden], &layer.gamma2, shift);
+    }
+    let mut rgb = [0.0; PANEL];
+    product::<S, false, false>(&weights.output, &weights.output_bias, x, &mut rgb);
+    [rgb[0], rgb[1], rgb[2]]
+}
+
+/// a b + c as `mul_add_e` does it: fused wherever the processor can.
+#[inline(always)]
+fn multiply_add<S: Simd>(a: f32, b: f32, c: f32) -> f32 {
+    if S::IS_SCALAR { a * b + c } else { a.mul_add(b, c) }
+}
+
+/// y = W x + b, with ADD y + W x + b, with RELU max(0, ·).
+#[inline(always)]
+fn product<S: Simd, const ADD: bool, const RELU: bool>(
+    weight: &Matrix,
+    bias: &[f32],
+    x: &[f32],
+    y: &mut [f32],
+) {
+    let inputs = weight.inputs;
+    let x = &x[..inputs];
+    let panels: &[[f32; PANEL]] = weight.rows();
+    let (bias, y) = (bias.as_chunks::<PANEL>().0, y.as_chunks_mut::<PANEL>().0);
+    let side = panels.chunks(SIDE * inputs).zip(bias.chunks(SIDE)).zip(y.chunks_mut(SIDE));
+    for ((panels, bias), y) in side {
+        if panels.len() == SIDE * inputs {
+            let panels: [&[[f32; PANEL]]; SIDE] = std::array::from_fn(|p| &panels[p * inputs..][..inputs]);
+            panel_group::<S, SIDE, ADD, RELU>(panels, bias, x, y);
+        } else {
+            for ((panel, bias), y) in panels.chunks_exact(inputs).zip(bias).zip(y) {
+                panel_group::<S, 1, ADD, RELU>([panel], &[*bias], x, std::slice::from_mut(y));
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn panel_group<S: Simd, const COUNT: usize, const ADD: bool, const RELU: bool>(
+    panels: [&[[f32; PANEL]]; COUNT],
+    bias: &[[f32; PANEL]],
+    x: &[f32],
+    y: &mut [[f32; PANEL]],
+) {
+    let mut sums: [[f32; PANEL]; COUNT] = std::array::from_fn(|p| bias[p]);
+    if ADD {
+        for p in 0..COUNT {
+            for i in 0..PANEL {
+                sums[p][i] += y[p][i];
+            }
+        }
+    }
+    let panels = panels.map(|panel| &panel[..x.len()]);
+    for (k, x) in x.iter().enumerate() {
+        for p in 0..COUNT {
+            for i in 0..PANEL {
+                sums[p][i] = multiply_add::<S>(panels[p][k][i], *x, sums[p][i]);
+            }
+        }
+    }
+    for p in 0..COUNT {
+        y[p] = if RELU { sums[p].map(|v| if v > 0.0 { v } else { 0.0 }) } else { sums[p] };
+    }
+}
+
+#[inline(always)]
+fn normalise<S: Simd>(x: &mut [f32], gamma: &[f32], shift: &[f32]) {
+    let count = x.len() as f32;
+    let mean = sum(x, |x| x) / count;
+    let variance = sum(x, |x| (x - mean) * (x - mean)) / count;
+    let scale = 1.0 / (variance + EPSILON).sqrt();
+    for ((x, gamma), shift) in x.iter_mut().zip(gamma).zip(shift) {
+        *x = multiply_add::<S>(*x - mean, scale * gamma, *shift);
+    }
+}
+
+#[inline(always)]
+fn sum(x: &[f32], term: impl Fn(f32) -> f32) -> f32 {
+    let mut sums = [0.0; PARTIAL];
+    let (whole, rest) = x.as_chunks::<PARTIAL>();
+    for x in whole {
+        for (sum, x) in sums.iter_mut().zip(x) {
+            *sum += term(*x);
+        }
+    }
+    for (sum, x) in sums.iter_mut().zip(rest) {
+        *sum += term(*x);
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
