@@ -97,7 +97,7 @@ fn radiance_beyond_half_becomes_float_unless_half_was_asked_for() {
     assert!(exr(&dir.path("bright.exr")).pixels.iter().flatten().all(|v| v.is_finite()));
     let half = [&args[..args.len() - 1], &["half.exr", "--half"]].concat();
     dir.refused(&half, &["half.exr", "65504", "float"]);
-    let infinite = [&args[..args.len() - 3], &["126", "-o", "infinite.exr"]].concat();
+    let infinite = [&args[..args.len() - 3], &["200", "-q", "-o", "infinite.exr"]].concat();
     dir.refused(&infinite, &["infinite.exr"]);
 }
 

@@ -77,6 +77,7 @@ impl Progress {
     }
 
     /// A remark between two updates, above the bar if there is one.
+    #[cfg(feature = "learn")]
     pub(crate) fn note(&self, text: &str) {
         match &self.view {
             View::Silent => {}

@@ -168,7 +168,7 @@ impl Bake {
             let mut done = 0;
             let result = output::write_all(&files, picture.grid(), &mut |push| {
                 picture.rows(&field, &mut |row| {
-                    if watch && let Some(v) = row.as_flattened().iter().find(|v| **v > HALF_MAX) {
+                    if watch && let Some(v) = row.as_flattened().iter().find(|v| **v > HALF_MAX && v.is_finite()) {
                         too_bright = Some(*v);
                         return Err(veni_core::Error::invalid("beyond the range of half precision"));
                     }
@@ -184,6 +184,9 @@ impl Bake {
                         "radiance of {value:.0} is beyond half precision ({HALF_MAX}): writing floats"
                     ));
                     precision = Precision::Float;
+                }
+                (Err(error @ veni_core::Error::Invalid(_)), None) if self.half => {
+                    bail!("{error} (leave --half out, or darken with --exposure -1 …)")
                 }
                 (Err(error), None) => return Err(with_remedy(error)),
                 (Ok(()), None) => break,

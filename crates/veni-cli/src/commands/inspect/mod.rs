@@ -11,7 +11,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Map, Value};
 use veni_core::Error;
@@ -114,8 +114,6 @@ fn describe(path: &Path) -> Result<Facts> {
         // safetensors: the length of a JSON header in 8 bytes, then that header
         [_, _, _, _, _, 0, 0, 0, b'{', ..] => model::describe(path),
         text if text.trim_ascii_start().starts_with(b"{") => latent::describe(path),
-        _ => image::describe(path).with_context(|| {
-            format!("{} is read as an image, being no model and no latent", path.display())
-        }),
+        _ => image::describe(path),
     }
 }
