@@ -50,7 +50,8 @@ fn turning_or_mirroring_the_latent_turns_or_mirrors_the_image() {
             let (s, c) = angle.sin_cos();
             for sign in [1.0, -1.0] {
                 let m = matrix([[c, s, 0.0], [-s * sign, c * sign, 0.0], [0.0, 0.0, 1.0]], &device);
-                let turned = decoder.forward(rotate(latent(&device), m.clone()), directions(&device).matmul(m));
+                let turned =
+                    decoder.forward(rotate(latent(&device), m.clone()), directions(&device).matmul(m));
                 let difference = largest_difference(&expected, &turned);
                 assert!(difference < 1e-5, "{form:?}, angle {angle}, sign {sign}: {difference}");
             }
@@ -114,7 +115,7 @@ fn latent_gradients_agree_with_finite_differences() {
         let scale = gradient.iter().fold(0.0f32, |m, g| m.max(g.abs()));
         let base = values(&latent(&device));
         for i in 0..base.len() {
-            let step = 2e-3;
+            let step = 5e-4;
             let at = |delta: f32| {
                 let mut z = base.clone();
                 z[i] += delta;
@@ -122,7 +123,7 @@ fn latent_gradients_agree_with_finite_differences() {
                 probe(decoder.forward(z, directions(&device))).into_scalar::<f32>()
             };
             let found = (at(step) - at(-step)) / (2.0 * step);
-            // ReLU kinks and f32 rounding of the difference leave about a percent of the largest entry.
+            // Curvature (the encoding turns fast), ReLU kinks and f32 rounding leave about a percent.
             assert!((found - gradient[i]).abs() < 2e-2 * scale, "{form:?} {i}: {found} {}", gradient[i]);
         }
     }
