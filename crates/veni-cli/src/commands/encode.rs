@@ -6,7 +6,7 @@ use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use serde_json::json;
 use veni_core::data::Item;
-use veni_core::eval::reconstruction::{Scores, scores};
+use veni_core::eval::metrics::{Alignment, Scores, scores};
 use veni_core::field::Field;
 use veni_core::latent::Latent;
 use veni_core::output::Overwrite;
@@ -117,7 +117,9 @@ impl<'a> Encoding<'a> {
         let mut decoded = vec![[0.0; 3]; grid.len()];
         field.log_radiance_batch(&grid.directions(), &mut decoded);
         let prediction: Vec<f32> = decoded.as_flattened().iter().map(|v| v - item.log_exposure).collect();
-        Ok(Encoded { scores: scores(grid, &prediction, &item.log_radiance), latent, panorama, field })
+        // the article's protocol, as in training
+        let scores = scores(&prediction, &item.log_radiance, grid.height, grid.width, Alignment::LogFactor);
+        Ok(Encoded { latent, scores, panorama, field })
     }
 }
 
@@ -207,16 +209,16 @@ fn print(path: &Path, output: Option<&PathBuf>, encoded: &Encoded, report: Repor
         let value = json!({
             "panorama": path.display().to_string(),
             "output": output.map(|o| o.display().to_string()),
-            "ldr_psnr": encoded.scores.ldr_psnr,
-            "hdr_psnr": encoded.scores.hdr_psnr,
-            "ssim": encoded.scores.ssim,
+            "ldr_psnr": encoded.scores.psnr_ldr,
+            "hdr_psnr": encoded.scores.psnr_hdr,
+            "ssim": encoded.scores.ssim_ldr,
             "latent": serde_json::from_str::<serde_json::Value>(&text)?,
         });
         return report.result("", &value);
     }
     match output {
         Some(output) => {
-            let (n, psnr) = (encoded.latent.vectors.len(), encoded.scores.ldr_psnr);
+            let (n, psnr) = (encoded.latent.vectors.len(), encoded.scores.psnr_ldr);
             let stops = encoded.latent.log_exposure / std::f32::consts::LN_2;
             let human =
                 format!("{}: {n} vectors, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB", output.display());

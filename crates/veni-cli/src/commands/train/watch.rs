@@ -1,5 +1,6 @@
 //! What a person sees of a run while it goes.
 
+use veni_core::eval::reconstruction::MeanScores;
 use veni_core::train::progress::{self, StepReport, ValidationReport};
 
 use crate::progress::Progress;
@@ -41,7 +42,7 @@ impl progress::Progress for Watch {
     fn validation(&mut self, report: &ValidationReport) {
         let Some(bar) = &self.bar else { return };
         let psnr = |name, scores: &Option<_>| {
-            scores.as_ref().map(|s: &veni_core::eval::reconstruction::Scores| format!("{name} {:.2} dB", s.ldr_psnr))
+            scores.as_ref().map(|s: &MeanScores| format!("{name} {:.2} dB", s.ldr_psnr))
         };
         let scores: Vec<_> = [psnr("val", &report.val), psnr("train", &report.train)].into_iter().flatten().collect();
         if !scores.is_empty() {
