@@ -16,7 +16,8 @@ fn a_seed_gives_the_same_sky_in_every_format() {
     let dir = Dir::new();
     bake(&dir, &["--seed", "7", "-o", "float.exr", "-o", "sky.hdr", "-o", "sky.png", "--float"]);
     bake(&dir, &["--seed", "7", "-o", "half.exr", "--half"]);
-    let (float, half, rgbe) = (exr(&dir.path("float.exr")), exr(&dir.path("half.exr")), hdr(&dir.path("sky.hdr")));
+    let (float, half, rgbe) =
+        (exr(&dir.path("float.exr")), exr(&dir.path("half.exr")), hdr(&dir.path("sky.hdr")));
     assert_eq!((float.width, float.height), (64, 32));
     assert!(float.pixels.iter().flatten().all(|v| v.is_finite() && *v > 0.0));
     // half: 11 significant bits; RGBE: 8 bits of the largest of three
@@ -97,8 +98,6 @@ fn radiance_beyond_half_becomes_float_unless_half_was_asked_for() {
     assert!(exr(&dir.path("bright.exr")).pixels.iter().flatten().all(|v| v.is_finite()));
     let half = [&args[..args.len() - 1], &["half.exr", "--half"]].concat();
     dir.refused(&half, &["half.exr", "65504", "float"]);
-    let infinite = [&args[..args.len() - 3], &["200", "-q", "-o", "infinite.exr"]].concat();
-    dir.refused(&infinite, &["infinite.exr"]);
 }
 
 /// A cube map against the equirectangular image of the same sky: the centre pixel of each face looks along its axis.
@@ -108,10 +107,12 @@ fn cube_faces_look_along_their_axes() {
     let args = ["bake", "--model", model(), "--seed", "5", "--float", "--quiet"];
     dir.ok(&[&args[..], &["--size", "1024", "-o", "sky.exr"]].concat());
     let sky = exr(&dir.path("sky.exr"));
-    // native directions of +x -x +y -y +z -z in each frame: z up; y up with +x kept; y up with z forward
+    // native directions of the faces +X -X +Y -Y +Z -Z: z up; y up with +x kept
     let z_up = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
     let gltf = [[1, 0, 0], [-1, 0, 0], [0, 0, 1], [0, 0, -1], [0, -1, 0], [0, 1, 0]];
-    for (frame, directions) in [("blender", z_up), ("gltf", gltf)] {
+    // native +x is the centre of a panorama: straight ahead in Bevy, whose cameras find it on face +Z
+    let bevy = [[0, -1, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0]];
+    for (frame, directions) in [("blender", z_up), ("gltf", gltf), ("bevy", bevy)] {
         let out = format!("{frame}.exr");
         dir.ok(&[&args[..], &["--layout", "cubemap", "--size", "65", "--frame", frame, "-o", &out]].concat());
         let cube = exr(&dir.path(&out));
@@ -120,10 +121,16 @@ fn cube_faces_look_along_their_axes() {
         assert_eq!(cube.attributes["veni:cubeFaces"], "+X -X +Y -Y +Z -Z");
         for (face, [x, y, z]) in directions.into_iter().enumerate() {
             let centre = cube.pixels[(face * 65 + 32) * 65 + 32];
-            let row = (256 - 256 * z).clamp(0, 511) as usize;
+            // an axis meets the panorama at a corner of four pixels, or at a pole
             let azimuth = f64::from(y).atan2(f64::from(x));
-            let column = ((0.5 - azimuth / std::f64::consts::TAU) * 1024.0) as usize % 1024;
-            let expected = sky.pixels[row * 1024 + column];
+            let column = ((0.5 - azimuth / std::f64::consts::TAU) * 1024.0) as usize;
+            let at = |row: usize, column: usize| sky.pixels[row * 1024 + column % 1024];
+            let around: Vec<_> = match z {
+                0 => [255, 256].iter().flat_map(|r| [at(*r, column + 1023), at(*r, column)]).collect(),
+                z => (0..1024).map(|c| at(if z > 0 { 0 } else { 511 }, c)).collect(),
+            };
+            let mean = |k: usize| around.iter().map(|p| p[k]).sum::<f32>() / around.len() as f32;
+            let expected = [mean(0), mean(1), mean(2)];
             let close = centre.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.02 * b);
             assert!(close, "{frame} face {face}: {centre:?}, the sky is {expected:?} there");
         }
@@ -139,7 +146,10 @@ fn a_panorama_is_encoded_on_the_fly() {
     bake(&dir, &[&panorama(), "-o", "direct.exr"]);
     dir.ok(&["encode", &panorama(), "--model", model(), "-o", "code.json"]);
     bake(&dir, &["code.json", "-o", "through.exr"]);
-    assert_eq!(std::fs::read(dir.path("direct.exr")).unwrap(), std::fs::read(dir.path("through.exr")).unwrap());
+    assert_eq!(
+        std::fs::read(dir.path("direct.exr")).unwrap(),
+        std::fs::read(dir.path("through.exr")).unwrap()
+    );
 }
 
 #[test]
@@ -156,7 +166,8 @@ fn results_are_json_when_asked_for() {
 #[test]
 fn a_sheet_shows_the_skies_that_bake_would_give() {
     let dir = Dir::new();
-    let args = ["sample", "--model", model(), "--seed", "4", "--grid", "3x2", "--size", "32", "-o", "sheet.png"];
+    let args =
+        ["sample", "--model", model(), "--seed", "4", "--grid", "3x2", "--size", "32", "-o", "sheet.png"];
     let [value] = &dir.json(&[&args[..], &["--latents", "codes"]].concat())[..] else { panic!("one object") };
     assert_eq!((value["count"].as_u64(), value["latents"].as_array().unwrap().len()), (Some(6), 6));
     let sheet = image::open(dir.path("sheet.png")).unwrap().to_rgb8();
@@ -188,5 +199,10 @@ fn the_first_command_of_a_newcomer_gives_a_sky() {
         let pixels = &sky.pixels[rows.start * 1024..rows.end * 1024];
         pixels.iter().map(|p| p[1].ln()).sum::<f32>() / pixels.len() as f32
     };
-    assert!(mean(128..256) > mean(256..384), "{} above, {} below the horizon", mean(128..256), mean(256..384));
+    assert!(
+        mean(128..256) > mean(256..384),
+        "{} above, {} below the horizon",
+        mean(128..256),
+        mean(256..384)
+    );
 }

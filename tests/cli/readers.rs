@@ -25,7 +25,8 @@ impl Image {
 
     /// This image with its columns rolled to the left by `columns`.
     pub(crate) fn rolled(&self, columns: usize) -> Self {
-        let pixels = self.pixels.chunks(self.width).flat_map(|row| [&row[columns..], &row[..columns]].concat());
+        let pixels =
+            self.pixels.chunks(self.width).flat_map(|row| [&row[columns..], &row[..columns]].concat());
         Self { pixels: pixels.collect(), attributes: self.attributes.clone(), ..*self }
     }
 }
@@ -164,7 +165,10 @@ pub(crate) fn hdr(path: &Path) -> Image {
                         row[at..at + count - 128].iter_mut().for_each(|p| p[channel] = value);
                         at += count - 128;
                     } else {
-                        row[at..at + count].iter_mut().zip(bytes.take(count)).for_each(|(p, v)| p[channel] = *v);
+                        row[at..at + count]
+                            .iter_mut()
+                            .zip(bytes.take(count))
+                            .for_each(|(p, v)| p[channel] = *v);
                         at += count;
                     }
                 }

@@ -58,7 +58,8 @@ fn a_run_leaves_all_that_is_promised() {
         assert!(dir.path("run").join(file).is_file(), "{file}");
     }
     assert!(std::fs::read_dir(dir.path("run/checkpoint")).unwrap().count() > 0);
-    let previews: Vec<_> = std::fs::read_dir(dir.path("run/preview")).unwrap().map(|e| e.unwrap().path()).collect();
+    let previews: Vec<_> =
+        std::fs::read_dir(dir.path("run/preview")).unwrap().map(|e| e.unwrap().path()).collect();
     assert!(!previews.is_empty());
     assert!(previews.iter().all(|p| image::open(p).is_ok()));
     assert_eq!(steps_done(&dir, "run"), 2);
@@ -163,7 +164,9 @@ fn settings_come_from_files_and_single_keys() {
     assert_eq!(config, std::fs::read_to_string(dir.path("b/config.toml")).unwrap());
     assert_eq!(weights(&dir, "a"), weights(&dir, "b"));
     let run = train_args(&data, "c", "2");
-    for (set, word) in [("nonsense=1", "nonsense"), ("batch", "="), ("batch=many", "batch"), ("batch=0", "batch")] {
+    for (set, word) in
+        [("nonsense=1", "nonsense"), ("batch", "="), ("batch=many", "batch"), ("batch=0", "batch")]
+    {
         dir.refused(&[&run[..], &["--set", set]].concat(), &[word]);
     }
     dir.write("broken.toml", "seed = ");

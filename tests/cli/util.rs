@@ -109,7 +109,8 @@ pub(crate) fn panoramas() -> &'static Path {
 
 /// One real panorama.
 pub(crate) fn panorama() -> String {
-    let mut files: Vec<_> = std::fs::read_dir(panoramas().join("val")).unwrap().map(|e| e.unwrap().path()).collect();
+    let mut files: Vec<_> =
+        std::fs::read_dir(panoramas().join("val")).unwrap().map(|e| e.unwrap().path()).collect();
     files.retain(|p| p.extension().is_some_and(|e| e == "exr" || e == "hdr"));
     files.sort();
     text(&files[0])

@@ -84,10 +84,13 @@ pub(crate) fn writable(folder: &Path, wanted: &Path) -> Result<()> {
 pub(crate) fn with_remedy(error: Error) -> anyhow::Error {
     let remedy = match &error {
         Error::Io { action: "write", source, .. } => match source.kind() {
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "free some space or name another disk",
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+                "free some space or name another disk"
+            }
             io::ErrorKind::FileTooLarge => "bake a smaller size or raise the limit on file sizes",
             io::ErrorKind::PermissionDenied => "make the folder writable or name another one",
-            _ => "check the disk or name another one",
+            // some encoders hide the kind
+            _ => "check free space, quota and limits, or name another disk",
         },
         _ => return error.into(),
     };
@@ -153,7 +156,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let files: Vec<_> = ["a.exr", "b.exr", "c.exr"].map(|n| (folder.path().join(n), options())).into();
         let image = Panorama::from_fn(Equirect::new(8, 4), |[x, y, z]| [2.0 + x, 2.0 + y, 2.0 + z]);
-        write_all(&files, image.grid(), &mut |push| image.pixels().chunks(8).try_for_each(&mut *push)).unwrap();
+        write_all(&files, image.grid(), &mut |push| image.pixels().chunks(8).try_for_each(&mut *push))
+            .unwrap();
         for (path, _) in &files {
             assert_eq!(Panorama::read(path).unwrap().pixels(), image.pixels());
         }
@@ -162,7 +166,8 @@ mod tests {
     #[test]
     fn a_failing_file_is_named_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let files: Vec<_> = ["a.exr", "missing/b.exr", "c.exr"].map(|n| (folder.path().join(n), options())).into();
+        let files: Vec<_> =
+            ["a.exr", "missing/b.exr", "c.exr"].map(|n| (folder.path().join(n), options())).into();
         let row = [[1.0; 3]; 8];
         let error = write_all(&files, Equirect::new(8, 4), &mut |push| (0..4).try_for_each(|_| push(&row)));
         let text = error.unwrap_err().to_string();

@@ -75,7 +75,8 @@ impl Picture {
             for first in (0..edge).step_by(band) {
                 let rows = first..edge.min(first + band);
                 directions.clear();
-                directions.extend(rows.flat_map(|row| (0..edge).map(move |i| face.direction(frame, edge, i, row))));
+                directions
+                    .extend(rows.flat_map(|row| (0..edge).map(move |i| face.direction(frame, edge, i, row))));
                 let pixels = &mut pixels[..directions.len()];
                 field.radiance_batch(&directions, pixels);
                 pixels.chunks_exact(edge).try_for_each(&mut *each)?;
@@ -107,7 +108,9 @@ impl Picture {
         let Equirect { width, height } = self.grid;
         match self.layout {
             Layout::Equirect => format!("{width} x {height}, {precision}"),
-            Layout::Cubemap => format!("six faces of {width} x {width}, {} frame, {precision}", self.frame_name()),
+            Layout::Cubemap => {
+                format!("six faces of {width} x {width}, {} frame, {precision}", self.frame_name())
+            }
         }
     }
 }

@@ -129,7 +129,9 @@ mod tests {
 
     #[test]
     fn durations_are_readable() {
-        for (seconds, text) in [(0, "0 s"), (119, "119 s"), (125, "2 min"), (7100, "118 min"), (11100, "3 h 05 min")] {
+        for (seconds, text) in
+            [(0, "0 s"), (119, "119 s"), (125, "2 min"), (7100, "118 min"), (11100, "3 h 05 min")]
+        {
             assert_eq!(duration(Duration::from_secs(seconds)), text);
         }
     }

@@ -24,7 +24,9 @@ impl FromStr for Size {
             })?;
             match n {
                 0 => Err("a side of 0 pixels holds no image: give at least 1".to_owned()),
-                n if n > MAX_SIDE => Err(format!("{n} pixels on a side is too large: give at most {MAX_SIDE}")),
+                n if n > MAX_SIDE => {
+                    Err(format!("{n} pixels on a side is too large: give at most {MAX_SIDE}"))
+                }
                 n => Ok(n),
             }
         };
@@ -76,7 +78,9 @@ mod tests {
 
     #[test]
     fn reads_widths_and_pairs() {
-        for (text, equirect) in [("2048", (2048, 1024)), ("64x32", (64, 32)), ("64X32", (64, 32)), ("8×4", (8, 4))] {
+        for (text, equirect) in
+            [("2048", (2048, 1024)), ("64x32", (64, 32)), ("64X32", (64, 32)), ("8×4", (8, 4))]
+        {
             assert_eq!(text.parse::<Size>().unwrap().equirect().unwrap(), equirect, "{text}");
         }
         assert_eq!("256".parse::<Size>().unwrap().cube().unwrap(), 256);

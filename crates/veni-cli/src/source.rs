@@ -63,11 +63,13 @@ pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<
         Content::Image => {
             let attributes = panorama::attributes(path)?;
             match attributes.get(LATENT) {
-                Some(text) => {
-                    Latent::from_json(text).map_err(|e| anyhow!("{}: attribute {LATENT}: {e}", path.display()))?
-                }
+                Some(text) => Latent::from_json(text)
+                    .map_err(|e| anyhow!("{}: attribute {LATENT}: {e}", path.display()))?,
                 None if attributes.contains_key(CUBE_FACES) => {
-                    bail!("{}: a cube map cannot be encoded; name an equirectangular panorama", path.display())
+                    bail!(
+                        "{}: a cube map cannot be encoded; name an equirectangular panorama",
+                        path.display()
+                    )
                 }
                 None => encode(path, loaded, report)?,
             }
@@ -75,7 +77,10 @@ pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<
     };
     check(&latent, model).with_context(|| path.display().to_string())?;
     if latent.model.is_none() {
-        report.note(format_args!("{}: does not say which model it belongs to; taken for this one", path.display()));
+        report.note(format_args!(
+            "{}: does not say which model it belongs to; taken for this one",
+            path.display()
+        ));
         latent.model = Some(model.hash());
     }
     Ok(latent)
@@ -85,7 +90,9 @@ pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<
 fn check(latent: &Latent, model: &Model) -> Result<()> {
     let (n, expected) = (latent.vectors.len(), model.latent_vectors());
     if n != expected {
-        bail!("a latent of {n} vectors, but this model has {expected}: name the latent's own model with --model FILE");
+        bail!(
+            "a latent of {n} vectors, but this model has {expected}: name the latent's own model with --model FILE"
+        );
     }
     match &latent.model {
         Some(hash) if *hash != model.hash() => bail!(
@@ -104,7 +111,10 @@ fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
 
 #[cfg(not(feature = "learn"))]
 fn encode(path: &Path, _: &Loaded, _: Report) -> Result<Latent> {
-    bail!("{}: no latent inside, and this build cannot encode panoramas (it lacks the feature `learn`)", path.display())
+    bail!(
+        "{}: no latent inside, and this build cannot encode panoramas (it lacks the feature `learn`)",
+        path.display()
+    )
 }
 
 enum Content {

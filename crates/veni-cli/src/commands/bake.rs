@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Result, bail};
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use serde_json::json;
 use veni_core::latent::Latent;
 use veni_core::output::Overwrite;
@@ -22,12 +22,16 @@ use crate::source;
 /// The largest finite half-precision number.
 const HALF_MAX: f32 = 65504.0;
 
+/// Largest |exposure|. Light that is 2^64 brighter than a sky is no light, and close to what an f32 can hold.
+const MAX_STOPS: f64 = 64.0;
+
 /// Stands where no PNG is written.
 const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
 
 /// Bake a sky to image files
 #[derive(Args, Debug)]
 #[command(
+    group = ArgGroup::new("sky").required(true),
     long_about = "Bake a sky to image files.\n\n\
         The sky is a latent: a latent file (JSON), an image that this program baked (its latent is inside), an HDR \
         panorama (encoded on the fly), or a random one named by --seed. The same seed and model give the same sky \
@@ -47,11 +51,11 @@ const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
 )]
 pub(crate) struct Bake {
     /// Latent file, baked image, or HDR panorama
-    #[arg(required_unless_present = "seed", conflicts_with = "seed")]
+    #[arg(group = "sky")]
     latent: Option<PathBuf>,
 
     /// A random sky from the model's prior, named by a number
-    #[arg(long, short, value_name = "S")]
+    #[arg(long, short, value_name = "S", group = "sky")]
     seed: Option<u64>,
 
     /// File to write (.exr, .hdr or .png); may be given several times
@@ -68,7 +72,7 @@ pub(crate) struct Bake {
     turn: f64,
 
     /// Make it brighter (or, negative, darker) by factors of two
-    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = finite, allow_hyphen_values = true,
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = stops, allow_hyphen_values = true,
         hide_default_value = true)]
     exposure: f64,
 
@@ -152,7 +156,10 @@ impl Bake {
                 }
                 let attributes = attributes.clone();
                 let latlong = picture.is_latlong();
-                Ok((path.clone(), WriteOptions { attributes, overwrite, latlong, ..WriteOptions::new(format) }))
+                Ok((
+                    path.clone(),
+                    WriteOptions { attributes, overwrite, latlong, ..WriteOptions::new(format) },
+                ))
             };
             self.output.iter().map(file).collect()
         };
@@ -168,7 +175,9 @@ impl Bake {
             let mut done = 0;
             let result = output::write_all(&files, picture.grid(), &mut |push| {
                 picture.rows(&field, &mut |row| {
-                    if watch && let Some(v) = row.as_flattened().iter().find(|v| **v > HALF_MAX && v.is_finite()) {
+                    if watch
+                        && let Some(v) = row.as_flattened().iter().find(|v| **v > HALF_MAX && v.is_finite())
+                    {
                         too_bright = Some(*v);
                         return Err(veni_core::Error::invalid("beyond the range of half precision"));
                     }
@@ -198,7 +207,8 @@ impl Bake {
 
     /// The latent with `--turn` and `--exposure` in it: what the files record.
     fn changed(&self, latent: &Latent) -> Latent {
-        let mut latent = if self.turn == 0.0 { latent.clone() } else { latent.turned(self.turn.to_radians()) };
+        let mut latent =
+            if self.turn == 0.0 { latent.clone() } else { latent.turned(self.turn.to_radians()) };
         latent.log_exposure += (self.exposure * std::f64::consts::LN_2) as f32;
         latent
     }
@@ -240,5 +250,12 @@ fn finite(text: &str) -> Result<f64, String> {
         Ok(v) if v.is_finite() => Ok(v),
         Ok(_) => Err("the number must be finite".to_owned()),
         Err(_) => Err("not a number".to_owned()),
+    }
+}
+
+fn stops(text: &str) -> Result<f64, String> {
+    match finite(text)? {
+        v if v.abs() <= MAX_STOPS => Ok(v),
+        _ => Err(format!("more than {MAX_STOPS} stops either way is beyond the range of floats")),
     }
 }

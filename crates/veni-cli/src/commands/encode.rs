@@ -84,9 +84,13 @@ pub(crate) struct Encoding<'a> {
 impl<'a> Encoding<'a> {
     pub(crate) fn new(loaded: &'a Loaded) -> Result<Self> {
         if !loaded.model.has_encoder() {
-            bail!("{}: this model has no encoder, it decodes only; name one that has with --model FILE", loaded.name);
+            bail!(
+                "{}: this model has no encoder, it decodes only; name one that has with --model FILE",
+                loaded.name
+            );
         }
-        let veni = Veni::from_model(&loaded.model, &DeviceKind::Flex.device()?).map_err(|e| e.in_file(&loaded.name))?;
+        let veni = Veni::from_model(&loaded.model, &DeviceKind::Flex.device()?)
+            .map_err(|e| e.in_file(&loaded.name))?;
         Ok(Self { loaded, veni })
     }
 
@@ -104,7 +108,8 @@ impl<'a> Encoding<'a> {
         }
         let grid = Equirect::new(GRID[0], GRID[1]);
         let item = Item::new(path, &panorama, grid);
-        let encoded = self.veni.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
+        let encoded =
+            self.veni.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
         let vectors = encoded.into_iter().next().map(|e| e.vectors).unwrap_or_default();
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
         let latent = Latent {
@@ -129,7 +134,8 @@ impl Encode {
         let outputs = self.outputs(overwrite)?;
         let loaded = source::model(&self.model)?;
         let encoding = Encoding::new(&loaded)?;
-        let mut sheet = self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
+        let mut sheet =
+            self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
         let mut progress = Progress::start(report, "panorama", 0, self.panoramas.len() as u64);
         let mut failed = Vec::new();
         for (at, path) in self.panoramas.iter().enumerate() {
@@ -167,7 +173,10 @@ impl Encode {
         }
         let outputs = match (&self.output, &self.out_dir) {
             (Some(_), _) if self.panoramas.len() > 1 => {
-                bail!("-o names one file for {} panoramas: name a folder with --out-dir DIR", self.panoramas.len())
+                bail!(
+                    "-o names one file for {} panoramas: name a folder with --out-dir DIR",
+                    self.panoramas.len()
+                )
             }
             (Some(output), _) => vec![output.clone()],
             (None, None) => return Ok(Vec::new()),
@@ -220,8 +229,10 @@ fn print(path: &Path, output: Option<&PathBuf>, encoded: &Encoded, report: Repor
         Some(output) => {
             let (n, psnr) = (encoded.latent.vectors.len(), encoded.scores.psnr_ldr);
             let stops = encoded.latent.log_exposure / std::f32::consts::LN_2;
-            let human =
-                format!("{}: {n} vectors, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB", output.display());
+            let human = format!(
+                "{}: {n} vectors, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB",
+                output.display()
+            );
             report.result(human, &())
         }
         None => to_stdout(format!("{text}\n").as_bytes()),

@@ -85,7 +85,8 @@ impl FromStr for Grid {
     fn from_str(text: &str) -> Result<Self, String> {
         let parse = |t: &str| t.trim().parse().ok().filter(|n| *n > 0);
         let sides = text.split_once(['x', 'X', '×']).and_then(|(c, r)| Some((parse(c)?, parse(r)?)));
-        let (columns, rows) = sides.ok_or_else(|| format!("'{text}' is no grid: give columns x rows, like 4x4"))?;
+        let (columns, rows) =
+            sides.ok_or_else(|| format!("'{text}' is no grid: give columns x rows, like 4x4"))?;
         Ok(Self { columns, rows })
     }
 }
@@ -105,7 +106,11 @@ impl Sample {
         let (grid, count) = self.grid()?;
         let (width, height) = self.size.equirect()?;
         if grid.columns.saturating_mul(width).saturating_mul(grid.rows * height) > MAX_PIXELS {
-            bail!("a sheet of {} x {} skies of {width} x {height} is too large: give a smaller --size", grid.columns, grid.rows);
+            bail!(
+                "a sheet of {} x {} skies of {width} x {height} is too large: give a smaller --size",
+                grid.columns,
+                grid.rows
+            );
         }
         let Some(last) = self.seed.checked_add(count as u64 - 1) else {
             bail!("--seed {}: leaves no room for {count} seeds; give a smaller one", self.seed);
@@ -125,7 +130,11 @@ impl Sample {
             }
             let sky = Panorama::new(cell, decoder.condition(&latent)?.bake(cell));
             let tonemap = Tonemap::filmic(&sky, 0.0);
-            sheet.place(at % grid.columns, at / grid.columns, sky.pixels().iter().map(|p| tonemap.apply_u8(*p)));
+            sheet.place(
+                at % grid.columns,
+                at / grid.columns,
+                sky.pixels().iter().map(|p| tonemap.apply_u8(*p)),
+            );
             progress.set(at as u64 + 1, String::new);
         }
         progress.finish();

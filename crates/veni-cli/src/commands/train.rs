@@ -148,7 +148,9 @@ impl Train {
             return Ok(Outcome::Fine);
         }
         let out = shell_word(&self.out);
-        report.note(format_args!("stopped after step {done} of {total}; to go on: veni-cli train --resume --out {out}"));
+        report.note(format_args!(
+            "stopped after step {done} of {total}; to go on: veni-cli train --resume --out {out}"
+        ));
         Ok(Outcome::Negative)
     }
 
@@ -167,7 +169,10 @@ impl Train {
     fn continued(&self) -> Result<Trainer> {
         let stored = self.out.join("config.toml");
         if !stored.is_file() {
-            bail!("{}: no run to continue (it has no config.toml); leave --resume out to begin one", self.out.display());
+            bail!(
+                "{}: no run to continue (it has no config.toml); leave --resume out to begin one",
+                self.out.display()
+            );
         }
         self.check_same(&stored)?;
         Ok(Trainer::resume(&self.out, &self.command_line())?)
@@ -199,7 +204,11 @@ impl Train {
         for entry in entries {
             let name = entry.map_err(|e| Error::io(out, "list", e))?.file_name();
             if !FILES.iter().chain(&FOLDERS).any(|known| name == *known) {
-                bail!("{}: holds {} beside its run; name a new folder with --out", out.display(), name.display());
+                bail!(
+                    "{}: holds {} beside its run; name a new folder with --out",
+                    out.display(),
+                    name.display()
+                );
             }
         }
         Ok(true)
@@ -230,7 +239,11 @@ impl Train {
             || "no validation yet".to_owned(),
             |b| format!("best validation LDR PSNR {:.2} dB at step {}", b.ldr_psnr, b.step),
         );
-        let steps = if finish == Finish::Complete { format!("{total} steps") } else { format!("{done} of {total} steps") };
+        let steps = if finish == Finish::Complete {
+            format!("{total} steps")
+        } else {
+            format!("{done} of {total} steps")
+        };
         let human = format!("{}: {steps} ({time}), {valued}", self.out.display());
         let value = json!({
             "run": self.out.display().to_string(),

@@ -27,11 +27,14 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
         facts.add("cube faces", faces.as_str(), faces.as_str());
     }
     if let Some(text) = attributes.get(LATENT) {
-        let code = Latent::from_json(text).map_err(|e| anyhow!("{}: attribute {LATENT}: {e}", path.display()))?;
+        let code =
+            Latent::from_json(text).map_err(|e| anyhow!("{}: attribute {LATENT}: {e}", path.display()))?;
         let value: serde_json::Value = serde_json::from_str(text)?;
         facts.add("latent", latent::summary(&code), value);
     }
-    for (name, value) in attributes.iter().filter(|(name, _)| ![LATENT, FRAME, CUBE_FACES].contains(&name.as_str())) {
+    for (name, value) in
+        attributes.iter().filter(|(name, _)| ![LATENT, FRAME, CUBE_FACES].contains(&name.as_str()))
+    {
         facts.attribute(name, value);
     }
     if !cube {
@@ -105,9 +108,14 @@ fn exr_facts(path: &Path) -> Result<Option<Exr>> {
         BlockDescription::ScanLines => "scan lines".to_owned(),
         BlockDescription::Tiles(t) => format!("{} x {} tiles", t.tile_size.0, t.tile_size.1),
     };
-    let channels: Vec<String> =
-        header.channels.list.iter().map(|c| format!("{}:{:?}", c.name, c.sample_type).to_lowercase()).collect();
-    let parts = if meta.headers.len() > 1 { format!(", {} parts", meta.headers.len()) } else { String::new() };
+    let channels: Vec<String> = header
+        .channels
+        .list
+        .iter()
+        .map(|c| format!("{}:{:?}", c.name, c.sample_type).to_lowercase())
+        .collect();
+    let parts =
+        if meta.headers.len() > 1 { format!(", {} parts", meta.headers.len()) } else { String::new() };
     Ok(Some(Exr {
         size: [window.size.0, window.size.1],
         storage: format!("{:?}, {blocks}{parts}", header.compression),

@@ -13,7 +13,8 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     let mut facts = Facts::new("latent");
     let n = latent.vectors.len();
     facts.add("vectors", format!("{n} (D = {})", 3 * n), n);
-    let lengths: Vec<f32> = latent.vectors.iter().map(|v| v.iter().map(|c| c * c).sum::<f32>().sqrt()).collect();
+    let lengths: Vec<f32> =
+        latent.vectors.iter().map(|v| v.iter().map(|c| c * c).sum::<f32>().sqrt()).collect();
     let shown: Vec<_> = lengths.iter().take(12).map(|l| format!("{l:.2}")).collect();
     let more = if n > 12 { format!(" … ({} more)", n - 12) } else { String::new() };
     facts.add("lengths", shown.join(" ") + &more, json!(lengths));

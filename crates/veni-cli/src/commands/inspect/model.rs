@@ -22,7 +22,13 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     let d = &config.decoder;
     facts.add(
         "decoder",
-        format!("{} parameters; {} layers of {}, {} heads", parameters(&model, "decoder."), d.layers, d.hidden, d.heads),
+        format!(
+            "{} parameters; {} layers of {}, {} heads",
+            parameters(&model, "decoder."),
+            d.layers,
+            d.hidden,
+            d.heads
+        ),
         json!({ "parameters": parameters(&model, "decoder."), "config": d }),
     );
     match &config.encoder {

@@ -17,7 +17,10 @@ const CONFIG: &str = "config.toml";
 pub(super) fn describe(folder: &Path) -> Result<Facts> {
     let (config, metrics) = (folder.join(CONFIG), folder.join(METRICS));
     if !config.is_file() {
-        bail!("{}: a folder, but no training run: it has no {CONFIG}; name the files in it", folder.display());
+        bail!(
+            "{}: a folder, but no training run: it has no {CONFIG}; name the files in it",
+            folder.display()
+        );
     }
     let config_text = fs::read_to_string(&config).map_err(|e| Error::io(&config, "read", e))?;
     let mut facts = Facts::new("training run");
@@ -28,7 +31,11 @@ pub(super) fn describe(folder: &Path) -> Result<Facts> {
             let step = line["step"].as_u64().unwrap_or(0);
             let of = steps.map(|n| format!(" of {n}")).unwrap_or_default();
             facts.add("step", format!("{step}{of}"), step);
-            facts.add("loss", format!("{:.4}", line["loss"].as_f64().unwrap_or(f64::NAN)), line["loss"].clone());
+            facts.add(
+                "loss",
+                format!("{:.4}", line["loss"].as_f64().unwrap_or(f64::NAN)),
+                line["loss"].clone(),
+            );
         }
         None => facts.add("step", "0 (not begun)", 0),
     }
@@ -39,7 +46,9 @@ pub(super) fn describe(folder: &Path) -> Result<Facts> {
             serde_json::json!({ "ldr_psnr": ldr_psnr, "step": step }),
         );
     }
-    for (name, file) in [("model", "model.safetensors"), ("checkpoint", "checkpoint"), ("previews", "preview")] {
+    for (name, file) in
+        [("model", "model.safetensors"), ("checkpoint", "checkpoint"), ("previews", "preview")]
+    {
         let path = folder.join(file);
         let there = path.exists();
         facts.add(name, if there { path.display().to_string() } else { "none yet".into() }, there);
@@ -51,7 +60,8 @@ pub(super) fn describe(folder: &Path) -> Result<Facts> {
 /// The lines so far; a half-written last line (the run may be alive, or was killed) is left out.
 fn read_lines(path: &Path) -> Result<Vec<Value>> {
     let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
-    let lines: Vec<_> = BufReader::new(file).lines().collect::<Result<_, _>>().map_err(|e| Error::io(path, "read", e))?;
+    let lines: Vec<_> =
+        BufReader::new(file).lines().collect::<Result<_, _>>().map_err(|e| Error::io(path, "read", e))?;
     let mut values = Vec::with_capacity(lines.len());
     for (at, line) in lines.iter().enumerate() {
         match serde_json::from_str(line) {

@@ -1,5 +1,7 @@
 //! Radiance over the sphere: extremes, mean, median, and where the brightest light comes from.
 
+use std::cmp::Ordering;
+
 use veni_core::panorama::{Panorama, luminance};
 
 /// Solid angle that is looked at for the sun, steradians: a cap of 3.2° radius. The disc itself (0.27°) is smaller
@@ -50,7 +52,8 @@ impl Statistics {
     /// The panorama must be clean ([`Panorama::sanitise`]).
     pub(super) fn of(image: &Panorama) -> Self {
         let grid = image.grid();
-        let rows = || image.pixels().chunks_exact(grid.width).enumerate().map(|(j, r)| (j, grid.solid_angle(j), r));
+        let rows =
+            || image.pixels().chunks_exact(grid.width).enumerate().map(|(j, r)| (j, grid.solid_angle(j), r));
         let (mut min, mut max, mut total, mut sphere) = (f32::INFINITY, 0f32, 0.0, 0.0);
         let mut histogram = vec![0f64; (OCTAVES * BINS_PER_OCTAVE) as usize];
         for (_, weight, row) in rows() {
@@ -64,16 +67,22 @@ impl Statistics {
         }
         let median = value(quantile_bin(&histogram, sphere / 2.0)).clamp(min, max);
         let brightest = quantile_bin(&histogram, (sphere - SUN_SOLID_ANGLE).max(0.0));
+        // of the darkest bin that takes part only so much as fills the solid angle
+        let above: f64 = histogram[brightest + 1..].iter().sum();
+        let part = ((SUN_SOLID_ANGLE - above) / histogram[brightest]).clamp(0.0, 1.0);
         let (mut sum, mut light) = ([0f64; 3], 0.0);
         for (j, weight, row) in rows() {
             for (i, pixel) in row.iter().enumerate() {
                 let y = luminance(*pixel);
-                if bin(y) >= brightest {
-                    let power = weight * f64::from(y);
-                    light += power;
-                    let direction = grid.direction(i, j);
-                    sum.iter_mut().zip(direction).for_each(|(s, d)| *s += power * f64::from(d));
-                }
+                let part = match bin(y).cmp(&brightest) {
+                    Ordering::Less => continue,
+                    Ordering::Equal => part,
+                    Ordering::Greater => 1.0,
+                };
+                let power = part * weight * f64::from(y);
+                light += power;
+                let direction = grid.direction(i, j);
+                sum.iter_mut().zip(direction).for_each(|(s, d)| *s += power * f64::from(d));
             }
         }
         let length = sum.iter().map(|s| s * s).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
@@ -135,7 +144,10 @@ mod tests {
     #[test]
     fn the_median_is_weighted_by_solid_angle() {
         // a polar cap of 45° covers a quarter of the rows, but only 15 % of the sphere
-        let image = Panorama::from_fn(Equirect::new(64, 32), |[_, _, z]| if z.abs() > 0.7 { [9.0; 3] } else { [1.0; 3] });
+        let image = Panorama::from_fn(
+            Equirect::new(64, 32),
+            |[_, _, z]| if z.abs() > 0.7 { [9.0; 3] } else { [1.0; 3] },
+        );
         let s = Statistics::of(&image);
         assert!((s.median - 1.0).abs() < 3e-3);
         assert!((s.mean - (0.7 + 0.3 * 9.0)).abs() < 0.2, "{}", s.mean);

@@ -15,7 +15,8 @@ impl Train {
     pub(super) fn settings(&self) -> Result<TrainConfig> {
         let mut config = match &self.config {
             Some(path) => read(path)?,
-            None => Preset::from(self.preset.unwrap_or(PresetName::Small)).config(self.latent_vectors.unwrap_or(9)),
+            None => Preset::from(self.preset.unwrap_or(PresetName::Small))
+                .config(self.latent_vectors.unwrap_or(9)),
         };
         if !self.data.is_empty() {
             config.data.folders = self.data.clone();
@@ -62,7 +63,10 @@ impl Train {
                 self.out.display()
             ),
             None if old.lines().count() != new.lines().count() => {
-                bail!("{}: the run was begun with other settings; leave the options out to go on", self.out.display())
+                bail!(
+                    "{}: the run was begun with other settings; leave the options out to go on",
+                    self.out.display()
+                )
             }
             None => Ok(()),
         }

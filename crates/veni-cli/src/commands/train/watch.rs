@@ -33,7 +33,8 @@ impl progress::Progress for Watch {
     fn step(&mut self, step: &StepReport, _remaining: f64) {
         if let Some(bar) = &mut self.bar {
             bar.set(step.step, || {
-                let parts: Vec<_> = step.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
+                let parts: Vec<_> =
+                    step.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
                 format!("loss {:.4} ({})", step.loss, parts.join(", "))
             });
         }
@@ -44,7 +45,8 @@ impl progress::Progress for Watch {
         let psnr = |name, scores: &Option<_>| {
             scores.as_ref().map(|s: &MeanScores| format!("{name} {:.2} dB", s.ldr_psnr))
         };
-        let scores: Vec<_> = [psnr("val", &report.val), psnr("train", &report.train)].into_iter().flatten().collect();
+        let scores: Vec<_> =
+            [psnr("val", &report.val), psnr("train", &report.train)].into_iter().flatten().collect();
         if !scores.is_empty() {
             let best = if report.best { " (best so far)" } else { "" };
             bar.note(&format!("step {}: LDR PSNR {}{best}", report.step, scores.join(", ")));
