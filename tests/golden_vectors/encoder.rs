@@ -215,7 +215,8 @@ fn compare(case: &Case, official: &Official, device: &Device) {
     official.compare_gradients(case, &encoder, &gradients);
 }
 
-/// The authors' weights on their directions, and the rewritten ones on clean directions without a mirror.
+/// The authors' weights on their directions; and on clean directions, without a mirror, the weights they rewrote and
+/// those we rewrite.
 fn import(case: &Case, official: &Official, device: &Device) {
     let colours = images(case.data("in.colors"), true, device);
     let check = |encoder: &Encoder, directions: Tensor<4>| {
@@ -230,7 +231,9 @@ fn import(case: &Case, official: &Official, device: &Device) {
     for (name, data) in case.tensors.iter().filter(|(name, _)| name.starts_with("clean.")) {
         rewritten.tensors.insert(name.replacen("clean.", "param.", 1), data.clone());
     }
-    check(&official.build(&rewritten, device), images(case.data("in.clean_directions"), true, device));
+    let clean = images(case.data("in.clean_directions"), true, device);
+    check(&official.build(&rewritten, device), clean.clone());
+    check(&theirs.for_negated_directions().unwrap_or_else(|e| panic!("{e}")), clean);
 }
 
 /// The authors' line sampling, `[T, P, 3]`: both ends of azimuth and of height are included.

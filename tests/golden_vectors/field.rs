@@ -68,7 +68,8 @@ pub(crate) struct Sizes {
 
 impl Sizes {
     pub(crate) fn of(case: &Case) -> Self {
-        let size = |key: &str| case.size(key).unwrap_or_else(|| panic!("the configuration has no size `{key}`"));
+        let size =
+            |key: &str| case.size(key).unwrap_or_else(|| panic!("the configuration has no size `{key}`"));
         let nerf = case.text("positional_encoding") != Some("None");
         let input = case.text("encoded_input").unwrap_or("Directions");
         Self {
@@ -154,9 +155,11 @@ pub(crate) fn build(case: &Case, prefix: &str, device: &Device) -> Decoder {
     let mut ours = weights::read(&decoder, "");
     for binding in sizes.bindings().0 {
         let key = format!("{prefix}{}", binding.key);
-        let theirs = case.weight(&key, &binding.shape).unwrap_or_else(|| panic!("the case has no weight `{key}`"));
+        let theirs =
+            case.weight(&key, &binding.shape).unwrap_or_else(|| panic!("the case has no weight `{key}`"));
         let theirs = if binding.transposed { theirs.transposed() } else { theirs };
-        let slot = ours.get_mut(&binding.ours).unwrap_or_else(|| panic!("our decoder has no {}", binding.ours));
+        let slot =
+            ours.get_mut(&binding.ours).unwrap_or_else(|| panic!("our decoder has no {}", binding.ours));
         if binding.ours == "input.weight" {
             slot.data.fill(0.0);
             let rows = sizes.used_rows();
@@ -242,7 +245,8 @@ fn compare(case: &Case, device: &Device) -> Outcome {
     let companion = match (case.get("param.network.fc.bias"), case.config.get("filler_seed")) {
         (None, None) => {
             let note = case.text("note").unwrap_or_default();
-            let named = note.split("params: see ").nth(1).map(|s| s.split([';', ' ', ',']).next().unwrap_or(s));
+            let named =
+                note.split("params: see ").nth(1).map(|s| s.split([';', ' ', ',']).next().unwrap_or(s));
             let Some(name) = named else { return Skipped("no weights, and no note where they are".into()) };
             match case.sibling(name) {
                 Some(companion) => Some(companion),
@@ -284,7 +288,10 @@ fn compare(case: &Case, device: &Device) -> Outcome {
     if let Some(probe) = case.get("probe.rgb") {
         let gradients = (rgb * probe.tensor([batch, rays, 3], device)).sum().backward();
         if case.expects("grad.in.latent") {
-            case.compare_tensor("grad.in.latent", &latent.grad(&gradients).expect("a gradient of the latent"));
+            case.compare_tensor(
+                "grad.in.latent",
+                &latent.grad(&gradients).expect("a gradient of the latent"),
+            );
         }
         if let Some((name, scale)) = &scale {
             let name = format!("grad.in.{name}");

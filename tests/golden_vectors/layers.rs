@@ -1,6 +1,7 @@
 //! Single layers: SO(2) linear, the Vector-Neuron layers, attention, feed-forward, transformer.
 
 use crate::case::{Case, Data};
+use crate::report::{Verdict, run_case};
 use crate::vectors::{Bindings, Kind, Linear, Transformer, feature, official};
 use crate::{Outcome, Outcome::Compared, Outcome::Skipped};
 use burn::module::Module;
@@ -217,4 +218,25 @@ fn transformer(case: &Case, device: &Device, layer: VectorLayer) {
         bindings.norm("norm", "norm", channels);
     }
     compare(case, device, config.init(&mut rng(), device), &bindings, |m, x| same(case, m.forward(x)));
+}
+
+/// Every weight counts: with any one of them off by a thousandth of the largest, the case fails.
+#[test]
+fn a_perturbed_weight_is_noticed() {
+    let device = Device::flex().autodiff();
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join("golden");
+    for name in ["c02_vn_transformer_encoder", "c02_sox_feedforward"] {
+        let case = || Case::load(&folder.join(name).with_extension("safetensors")).expect("a readable case");
+        assert!(matches!(run_case(&case(), &device), Verdict::Passed(_)), "{name}");
+        let weights: Vec<_> = case().tensors.into_keys().filter(|key| key.starts_with("param.")).collect();
+        assert!(weights.len() > 7, "{name}: {weights:?}");
+        for key in weights {
+            let mut case = case();
+            let values = &mut case.tensors.get_mut(&key).expect("just listed").values;
+            let largest = values.iter().fold(1f32, |m, v| m.max(v.abs()));
+            let middle = values.len() / 2;
+            values[middle] += 1e-3 * largest;
+            assert!(matches!(run_case(&case, &device), Verdict::Failed(_)), "{name}: {key} does not matter");
+        }
+    }
 }

@@ -48,7 +48,9 @@ fn weighted(case: &Case, device: &Device) {
         hdr_mse: weight("hdr_mse"),
         ldr_mse: weight("ldr_mse"),
     };
-    let [_, height, width, _] = case.data("in.pred").shape[..] else { panic!("in.pred is no batch of images") };
+    let [_, height, width, _] = case.data("in.pred").shape[..] else {
+        panic!("in.pred is no batch of images")
+    };
     let loss = Loss::new(&config, height, width, device);
     let input = |name: &str| case.get(name).map(|_| ());
     let prediction = case.tensor::<4>("in.pred", device).require_grad();
@@ -77,7 +79,10 @@ fn weighted(case: &Case, device: &Device) {
         }
         let gradients = value.backward();
         if case.expects(&leaves[0]) {
-            case.compare_tensor(&leaves[0], &prediction.grad(&gradients).expect("a gradient of the prediction"));
+            case.compare_tensor(
+                &leaves[0],
+                &prediction.grad(&gradients).expect("a gradient of the prediction"),
+            );
         }
         for (leaf, tensor) in leaves[1..].iter().zip(posterior.iter().flat_map(|(m, l)| [m, l])) {
             if case.expects(leaf) {
@@ -92,7 +97,9 @@ fn weighted(case: &Case, device: &Device) {
 
 /// `out.<operator>_<scales>_<plain|ssi>` and the raw filters, on [B, C, H, W].
 fn mage_pieces(case: &Case, device: &Device) {
-    let [batch, channels, height, width] = case.data("in.pred").shape[..] else { panic!("in.pred is no batch") };
+    let [batch, channels, height, width] = case.data("in.pred").shape[..] else {
+        panic!("in.pred is no batch")
+    };
     let planes = |x: Tensor<4>| x.reshape([batch * channels, height, width]);
     let target = planes(case.tensor::<4>("in.target", device));
     for name in case.tensors.keys().filter_map(|n| n.strip_prefix("out.")) {
@@ -121,8 +128,13 @@ fn mage_pieces(case: &Case, device: &Device) {
             _ => continue,
         };
         let (Ok(scales), true) = (scales.parse(), ["plain", "ssi"].contains(&kind)) else { continue };
-        let value =
-            mage::reference_planes(planes(prediction.clone()), target.clone(), operator, scales, kind == "ssi");
+        let value = mage::reference_planes(
+            planes(prediction.clone()),
+            target.clone(),
+            operator,
+            scales,
+            kind == "ssi",
+        );
         case.compare_tensor(&format!("out.{name}"), &value);
         let leaf = format!("grad.{name}");
         if case.expects(&leaf) {

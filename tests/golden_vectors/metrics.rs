@@ -3,7 +3,8 @@
 use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared};
 use burn::tensor::Device;
-use veni::eval::metrics::{Alignment, display, log_factor, pearson, psnr, quantile, scores, spearman, srgb, ssim};
+use veni::eval::metrics::{Alignment, log_factor, pearson, psnr, scores, spearman, ssim};
+use veni::panorama::tonemap::{quantile, srgb, srgb_q98};
 
 /// See [`Family`](crate::Family). No gradients and no tensors: the device plays no part.
 pub(crate) fn run(case: &Case, _device: &Device) -> Option<Outcome> {
@@ -37,7 +38,9 @@ fn wide(data: &Data) -> Vec<f64> {
 
 /// [1, C, H, W] to [H, W, C].
 fn channels_last(data: &Data) -> (Vec<f64>, [usize; 3]) {
-    let [1, channels, height, width] = data.shape[..] else { panic!("{:?} is not one planar image", data.shape) };
+    let [1, channels, height, width] = data.shape[..] else {
+        panic!("{:?} is not one planar image", data.shape)
+    };
     let plane = height * width;
     let values = (0..plane).flat_map(|k| (0..channels).map(move |c| f64::from(data.values[c * plane + k])));
     (values.collect(), [height, width, channels])
@@ -49,10 +52,9 @@ fn images(case: &Case) {
             case.compare_scalar(name, value());
         }
     };
-    let image = |name: &str, value: &dyn Fn() -> Vec<f64>| {
+    let image = |name: &str, value: &dyn Fn() -> Vec<f32>| {
         if let Some(golden) = case.get(name) {
-            let values = value().into_iter().map(|v| v as f32).collect();
-            case.compare(name, &Data::new(golden.shape.clone(), values));
+            case.compare(name, &Data::new(golden.shape.clone(), value()));
         }
     };
     let (prediction, target) = (case.data("in.pred_log"), case.data("in.gt_log"));
@@ -63,12 +65,14 @@ fn images(case: &Case) {
 
     scalar("out.scale", &|| log_factor(&prediction.values, &target.values));
     scalar("out.train_psnr", &|| psnr(&aligned, &gt));
-    scalar("out.pred_q98", &|| quantile(&aligned, 0.98));
-    scalar("out.gt_q98", &|| quantile(&gt, 0.98));
-    image("out.pred_srgb", &|| display(&aligned));
-    image("out.gt_srgb", &|| display(&gt));
-    image("out.srgb_noq", &|| gt.iter().map(|v| srgb(*v).clamp(0.0, 1.0)).collect());
-    image("out.srgb_q2_noclamp", &|| gt.iter().map(|v| srgb(v / 2.0)).collect());
+    let [narrow_aligned, narrow_gt] =
+        [&aligned, &gt].map(|x| x.iter().map(|v| *v as f32).collect::<Vec<_>>());
+    scalar("out.pred_q98", &|| f64::from(quantile(&narrow_aligned, 0.98)));
+    scalar("out.gt_q98", &|| f64::from(quantile(&narrow_gt, 0.98)));
+    image("out.pred_srgb", &|| srgb_q98(&narrow_aligned).0);
+    image("out.gt_srgb", &|| srgb_q98(&narrow_gt).0);
+    image("out.srgb_noq", &|| narrow_gt.iter().map(|v| srgb(*v).clamp(0.0, 1.0)).collect());
+    image("out.srgb_q2_noclamp", &|| narrow_gt.iter().map(|v| srgb(v / 2.0)).collect());
     for (prefix, alignment) in [("scaled", Alignment::LogFactor), ("unscaled", Alignment::None)] {
         let s = scores(&prediction.values, &target.values, height, width, alignment);
         scalar(&format!("out.{prefix}.psnr_hdr"), &|| s.psnr_hdr);

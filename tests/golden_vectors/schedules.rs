@@ -47,7 +47,8 @@ fn weights(case: &Case) {
     }
     if let Some(o) = case.config.get("sigmoid") {
         let weight = number(o, "weight").unwrap_or(1.0);
-        let schedule = WeightSchedule::Sigmoid { centre: need(o, "x_shift"), width: need(o, "x_mult"), weight };
+        let schedule =
+            WeightSchedule::Sigmoid { centre: need(o, "x_shift"), width: need(o, "x_mult"), weight };
         compare(case, "out.sigmoid", steps, |t| schedule.at(t));
     }
 }

@@ -1,8 +1,10 @@
 //! The harness itself: the filler's published values, the tolerance rule, and that it can fail.
 
-use crate::case::Data;
+use crate::case::{Case, Data};
 use crate::compare::{Tolerance, check};
 use crate::filler;
+use crate::report::{Verdict, case_files, run_case};
+use burn::tensor::Device;
 
 #[test]
 fn filler_gives_the_published_values() {
@@ -25,4 +27,42 @@ fn deviations_beyond_the_tolerance_are_counted() {
         assert!(check(&broken, &golden, tolerance).unwrap_err().starts_with("1 of 4"));
     }
     assert!(check(&Data::new([3], vec![1.0; 3]), &golden, tolerance).is_err());
+}
+
+/// A weight of every small case is moved, and the harness must see it.
+#[test]
+fn a_perturbed_weight_is_noticed() {
+    let device = Device::flex().autodiff();
+    let folder = crate::folder();
+    let mut perturbed = 0;
+    for path in case_files(&folder) {
+        let small = std::fs::metadata(&path).is_ok_and(|m| m.len() < 100_000);
+        let Some(case) = small.then(|| Case::load(&path).ok()).flatten() else { continue };
+        // The element on which the outputs depend most, by the file's own gradients.
+        let gradients = case.tensors.iter().filter_map(|(name, g)| Some((name.strip_prefix("grad.")?, g)));
+        let parameters = gradients.filter(|(name, _)| name.starts_with("param.") && case.expects(name));
+        let elements =
+            parameters.flat_map(|(name, g)| g.values.iter().enumerate().map(move |(i, v)| (name, i, *v)));
+        let Some((name, index, _)) = elements.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else {
+            continue;
+        };
+        let name = name.to_owned();
+        if !matches!(run_case(&case, &device), Verdict::Passed(_)) {
+            continue;
+        }
+        let mut wrong = Case::load(&path).expect("it was read before");
+        let weights = &mut wrong.tensors.get_mut(&name).expect("it was found above").values;
+        let largest = weights.iter().fold(0.1f32, |m, w| m.max(w.abs()));
+        weights[index] += 0.05 * largest;
+        match run_case(&wrong, &device) {
+            Verdict::Failed(messages) => {
+                assert!(messages.iter().any(|m| m.contains("elements fail")), "{}: {messages:?}", case.name);
+            }
+            other => panic!("{}: {name}[{index}] was moved, and the verdict is {other:?}", case.name),
+        }
+        perturbed += 1;
+    }
+    // A folder of other cases may hold none with weights; ours does.
+    let ours = std::env::var_os("VENI_GOLDEN_DIR").is_none();
+    assert!(perturbed >= 8 || !ours, "only {perturbed} cases with weights");
 }

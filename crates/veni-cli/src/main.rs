@@ -1,2 +1,39 @@
-//! The command line of veni.
-fn main() {}
+//! `veni-cli`: train, encode, sample and bake natural illumination.
+//!
+//! One file per command in [`commands`]; what they share is beside this file. Results go to stdout,
+//! everything else to stderr; exit codes are 0 (fine), 1 (ran, negative outcome), 2 (error).
+
+mod args;
+mod commands;
+mod output;
+mod picture;
+mod progress;
+mod report;
+mod sheet;
+mod size;
+mod source;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::report::{Outcome, Report};
+
+/// Training allocates and frees tensors all the time, which this allocator does faster than most systems' own.
+#[cfg(feature = "learn")]
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+fn main() -> ExitCode {
+    let cli = args::Cli::parse();
+    let report = Report::new(cli.json, cli.quiet);
+    match commands::run(cli.command, report) {
+        Ok(Outcome::Fine) => ExitCode::SUCCESS,
+        Ok(Outcome::Negative) => ExitCode::from(1),
+        Err(error) if report::is_closed_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            report::error(&error);
+            ExitCode::from(2)
+        }
+    }
+}

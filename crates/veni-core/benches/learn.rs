@@ -1,13 +1,15 @@
-//! The learning world: what encoding a panorama and learning from it cost.
+//! The learning world: what encoding a panorama, decoding it and learning from it cost.
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
 use burn::tensor::{Device, Tensor, TensorData};
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
-use veni_core::model::EncoderConfig;
-use veni_core::vae::Encoder;
+use veni_core::model::{DecoderConfig, EncoderConfig};
+use veni_core::sphere::Equirect;
+use veni_core::train::loss::{Loss, LossConfig};
+use veni_core::vae::{Decoder, Encoder};
 
 /// The paper's encoder, and one of 1.9 M parameters.
 fn sizes() -> [(&'static str, EncoderConfig); 2] {
@@ -78,5 +80,41 @@ fn encoder_gradient(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, encoder_forward, encoder_gradient);
+/// Forward and backward of the decoder for four images in 2048 directions each, with gradients of all
+/// weights and of the latents; and of the losses of a training step.
+fn decoder_gradient(criterion: &mut Criterion) {
+    let device = Device::flex().autodiff();
+    let mut group = criterion.benchmark_group("decoder gradient, 4 × 2048 directions");
+    group.sample_size(10);
+    let grid = Equirect::new(64, 32);
+    let directions = TensorData::new(grid.directions().into_flattened(), [grid.len(), 3]);
+    let directions = Tensor::<2>::from_data(directions, &device);
+    for n in [9, 100] {
+        let config = DecoderConfig::default();
+        let decoder = Decoder::new(&config, n, &mut ChaCha8Rng::seed_from_u64(1), &device);
+        let values: Vec<f32> = (0..4 * n * 3).map(|i| (1.3 * i as f32).sin()).collect();
+        let latent = Tensor::<3>::from_data(TensorData::new(values, [4, n, 3]), &device).require_grad();
+        let (m, h) = (n + 2, config.hidden);
+        // Multiply-adds per direction; the backward pass has two products for each of the forward one's.
+        let multiply_adds = 3 * (4 * m * h + config.layers * 2 * h * h + 3 * h);
+        group.throughput(Throughput::Elements((2 * multiply_adds * 4 * grid.len()) as u64));
+        group.bench_function(format!("N = {n}, throughput in FLOP/s"), |b| {
+            b.iter(|| decoder.forward(latent.clone(), directions.clone()).sum().backward());
+        });
+    }
+    let loss = Loss::new(&LossConfig::default(), grid.height, grid.width, &device);
+    let shape = [4, grid.height, grid.width, 3];
+    let image = |phase: f32| {
+        let values: Vec<f32> = (0..4 * grid.len() * 3).map(|i| (1.3 * i as f32 + phase).sin()).collect();
+        Tensor::<4>::from_data(TensorData::new(values, shape), &device)
+    };
+    let (prediction, target) = (image(0.0).require_grad(), image(1.0));
+    group.throughput(Throughput::Elements(1));
+    group.bench_function("losses alone", |b| {
+        b.iter(|| loss.terms(0, prediction.clone(), target.clone(), None).total().backward());
+    });
+    group.finish();
+}
+
+criterion_group!(benches, encoder_forward, encoder_gradient, decoder_gradient);
 criterion_main!(benches);

@@ -2,9 +2,9 @@
 //!
 //! `cargo run --release -p veni-core --example gemm_rate`; `RAYON_NUM_THREADS=1` before it for one core.
 //!
-//! The rate is that of burn's flex device (the `gemm` crate) on 2048 × 2048 matrices. The decoder bakes filler weights of the paper's
-//! sizes; its multiply-adds are 5(N+2)·128 + 12·128² + 128·3 per direction. Both take turns and the best of
-//! several runs counts, so that other work on the machine disturbs both alike.
+//! The rate is that of burn's flex device (the `gemm` crate) on 2048 × 2048 matrices. The decoder bakes filler
+//! weights of the paper's sizes; its multiply-adds are 5(N+2)·128 + 12·128² + 128·3 per direction. Both take
+//! turns and the best of several runs counts, so that other work on the machine disturbs both alike.
 
 use std::hint::black_box;
 use std::time::Instant;

@@ -1,11 +1,11 @@
 //! VENI, a learned prior of natural outdoor illumination (arXiv 2601.14079), in two worlds.
 //!
 //! The **lighting world** is what a renderer embeds; it knows nothing of tensors or training:
-//! [`sphere`] (directions, frames, grids), [`panorama`] (HDR images), [`latent`] (the code),
+//! `sphere` (directions, frames, grids), [`panorama`] (HDR images), [`latent`] (the code),
 //! [`model`] (the weight file) and [`field`] (the decoder folded for one latent).
 //!
-//! The **learning world** (feature `learn`, on by default) is built on burn: [`nn`] (equivariant
-//! layers), [`vae`] (encoder and decoder), [`data`], [`train`], [`fit`] and [`eval`]. It uses the
+//! The **learning world** (feature `learn`, on by default) is built on burn: `nn` (equivariant
+//! layers), `vae` (encoder and decoder), `data`, `train`, `fit` and `eval`. It uses the
 //! lighting world and never the reverse; the bridge between them is the model file.
 
 pub mod error;

@@ -75,9 +75,9 @@ fn scatter<S: Simd>(simd: S, directions: &[[f32; 3]], rows: &mut [Row<S>]) {
             flat[k * lanes + i] = *value;
         }
     }
-    for v in 0..VECTORS {
-        let (x, y) = (rows[0][v], rows[1][v]);
-        rows[3][v] = simd.sqrt_f32s(simd.mul_add_f32s(x, x, simd.mul_f32s(y, y)));
+    let [xs, ys, _, radii] = rows else { unreachable!("a direction is four rows") };
+    for ((radius, x), y) in radii.iter_mut().zip(xs).zip(ys) {
+        *radius = simd.sqrt_f32s(simd.mul_add_f32s(*x, *x, simd.mul_f32s(*y, *y)));
     }
 }
 
@@ -124,9 +124,11 @@ fn encode<S: Simd>(
     for (j, out) in inputs.zip(out) {
         for v in 0..VECTORS {
             let (value, turns) = match folded.vectors.get(j) {
-                Some(z) => {
-                    inner_product(simd, z.map(|c| simd.splat_f32s(c)), [direction[0][v], direction[1][v]])
-                }
+                Some(z) => inner_product(
+                    simd,
+                    [simd.splat_f32s(z[0]), simd.splat_f32s(z[1])],
+                    [direction[0][v], direction[1][v]],
+                ),
                 None => [direction[2 + j - n][v]; 2].into(),
             };
             let [sin1, cos1] = math::sin_cos_turns(simd, turns);
@@ -143,10 +145,9 @@ fn encode<S: Simd>(
 /// rounding errors are recovered by fused multiply-add, and whole turns are dropped before adding.
 #[inline(always)]
 pub(super) fn inner_product<S: Simd>(simd: S, z: [S::f32s; 2], d: [S::f32s; 2]) -> (S::f32s, S::f32s) {
-    let [(a, a_low), (b, b_low)] = [0, 1].map(|k| {
-        let product = simd.mul_f32s(z[k], d[k]);
-        (product, simd.mul_add_f32s(z[k], d[k], simd.neg_f32s(product)))
-    });
+    let (a, b) = (simd.mul_f32s(z[0], d[0]), simd.mul_f32s(z[1], d[1]));
+    let a_low = simd.mul_add_f32s(z[0], d[0], simd.neg_f32s(a));
+    let b_low = simd.mul_add_f32s(z[1], d[1], simd.neg_f32s(b));
     let high = simd.add_f32s(math::fraction(simd, a), math::fraction(simd, b));
     (simd.add_f32s(a, b), simd.add_f32s(high, simd.add_f32s(a_low, b_low)))
 }
@@ -183,12 +184,11 @@ fn tile<S: Simd, const ROWS: usize, const FROM: usize, const ADD: bool, const RE
     x: &[Row<S>],
     y: &mut [Row<S>; PANEL],
 ) {
-    let mut sums: [Row<S>; ROWS] = std::array::from_fn(|i| [simd.splat_f32s(bias[FROM + i]); VECTORS]);
-    if ADD {
-        for i in 0..ROWS {
-            for v in 0..VECTORS {
-                sums[i][v] = simd.add_f32s(sums[i][v], y[FROM + i][v]);
-            }
+    let mut sums = [[simd.splat_f32s(0.0); VECTORS]; ROWS];
+    for i in 0..ROWS {
+        let bias = simd.splat_f32s(bias[FROM + i]);
+        for v in 0..VECTORS {
+            sums[i][v] = if ADD { simd.add_f32s(bias, y[FROM + i][v]) } else { bias };
         }
     }
     for (weights, x) in panel.iter().zip(x) {
@@ -211,20 +211,15 @@ fn tile<S: Simd, const ROWS: usize, const FROM: usize, const ADD: bool, const RE
 #[inline(always)]
 fn normalise<S: Simd>(simd: S, x: &mut [Row<S>], gamma: &[f32], shift: &[f32]) {
     let count = simd.splat_f32s(x.len() as f32);
-    let mean = sum(simd, x, |x, _| x, [simd.splat_f32s(0.0); VECTORS]).map(|s| simd.div_f32s(s, count));
-    let squares = sum(
-        simd,
-        x,
-        |x, mean| {
-            let d = simd.sub_f32s(x, mean);
-            simd.mul_f32s(d, d)
-        },
-        mean,
-    );
-    let scale = squares.map(|s| {
-        let variance = simd.add_f32s(simd.div_f32s(s, count), simd.splat_f32s(EPSILON));
-        simd.div_f32s(simd.splat_f32s(1.0), simd.sqrt_f32s(variance))
-    });
+    let mut mean = sum::<S, false>(simd, x, [simd.splat_f32s(0.0); VECTORS]);
+    for mean in &mut mean {
+        *mean = simd.div_f32s(*mean, count);
+    }
+    let mut scale = sum::<S, true>(simd, x, mean);
+    for scale in &mut scale {
+        let variance = simd.add_f32s(simd.div_f32s(*scale, count), simd.splat_f32s(EPSILON));
+        *scale = simd.div_f32s(simd.splat_f32s(1.0), simd.sqrt_f32s(variance));
+    }
     for ((row, gamma), shift) in x.iter_mut().zip(gamma).zip(shift) {
         let (gamma, shift) = (simd.splat_f32s(*gamma), simd.splat_f32s(*shift));
         for v in 0..VECTORS {
@@ -234,19 +229,35 @@ fn normalise<S: Simd>(simd: S, x: &mut [Row<S>], gamma: &[f32], shift: &[f32]) {
     }
 }
 
-/// Σ term(x, mean) over the rows, in [`PARTIAL`] interleaved sums.
+/// Σ x over the rows, with SQUARES Σ (x − mean)², in [`PARTIAL`] interleaved sums.
 #[inline(always)]
-fn sum<S: Simd>(simd: S, x: &[Row<S>], term: impl Fn(S::f32s, S::f32s) -> S::f32s, mean: Row<S>) -> Row<S> {
+fn sum<S: Simd, const SQUARES: bool>(simd: S, x: &[Row<S>], mean: Row<S>) -> Row<S> {
     let mut sums = [[simd.splat_f32s(0.0); VECTORS]; PARTIAL];
     let (whole, rest) = x.as_chunks::<PARTIAL>();
-    let rows = whole.iter().map(|rows| &rows[..]).chain(std::iter::once(rest));
-    for rows in rows {
+    for rows in whole {
         for (sum, row) in sums.iter_mut().zip(rows) {
-            for v in 0..VECTORS {
-                sum[v] = simd.add_f32s(sum[v], term(row[v], mean[v]));
-            }
+            accumulate::<S, SQUARES>(simd, sum, row, &mean);
         }
     }
-    let [a, b, c, d] = sums;
-    std::array::from_fn(|v| simd.add_f32s(simd.add_f32s(a[v], b[v]), simd.add_f32s(c[v], d[v])))
+    for (sum, row) in sums.iter_mut().zip(rest) {
+        accumulate::<S, SQUARES>(simd, sum, row, &mean);
+    }
+    let [mut a, b, c, d] = sums;
+    for v in 0..VECTORS {
+        a[v] = simd.add_f32s(simd.add_f32s(a[v], b[v]), simd.add_f32s(c[v], d[v]));
+    }
+    a
+}
+
+#[inline(always)]
+fn accumulate<S: Simd, const SQUARES: bool>(simd: S, sum: &mut Row<S>, row: &Row<S>, mean: &Row<S>) {
+    for v in 0..VECTORS {
+        let term = if SQUARES {
+            let centred = simd.sub_f32s(row[v], mean[v]);
+            simd.mul_f32s(centred, centred)
+        } else {
+            row[v]
+        };
+        sum[v] = simd.add_f32s(sum[v], term);
+    }
 }

@@ -7,7 +7,7 @@ const ROUND: f32 = 12_582_912.0;
 
 /// sin 2πu = u·Σ Sᵢ u²ⁱ and cos 2πu = 1 + u² Σ Cᵢ u²ⁱ on |u| ≤ 1/8.
 /// (interpolated at Chebyshev nodes; the polynomials' own error is below 3e-9).
-const SIN: [f32; 4] = [6.283_185_3, -41.341_663, 81.592_54, -75.401_61];
+const SIN: [f32; 4] = [std::f32::consts::TAU, -41.341_663, 81.592_54, -75.401_61];
 const COS: [f32; 4] = [-19.739_208, 64.939_37, -85.448_82, 59.424_107];
 
 /// t − round(t), for |t| < 2²².
@@ -33,14 +33,19 @@ pub(super) fn sin_cos_turns<S: Simd>(simd: S, t: S::f32s) -> [S::f32s; 2] {
     let q = simd.transmute_u32s_f32s(shifted);
     let (one, two) = (simd.splat_u32s(1), simd.splat_u32s(2));
     let odd = simd.equal_u32s(simd.and_u32s(q, one), one);
-    let sign = |q: S::u32s| simd.wrapping_dyn_shl_u32s(simd.and_u32s(q, two), simd.splat_u32s(30));
-    let signed = |value: S::f32s, sign: S::u32s| {
-        simd.transmute_f32s_u32s(simd.xor_u32s(simd.transmute_u32s_f32s(value), sign))
-    };
     [
-        signed(simd.select_f32s(odd, cos, sin), sign(q)),
-        signed(simd.select_f32s(odd, sin, cos), sign(simd.add_u32s(q, one))),
+        signed(simd, simd.select_f32s(odd, cos, sin), simd.and_u32s(q, two)),
+        signed(simd, simd.select_f32s(odd, sin, cos), simd.and_u32s(simd.add_u32s(q, one), two)),
     ]
+}
+
+// A helper instead of a closure here and below: a closure is compiled without the caller's SIMD features, and
+// inlined too late to gain them.
+/// `value`, negated where `bit1` is 2 (it is 0 or 2).
+#[inline(always)]
+fn signed<S: Simd>(simd: S, value: S::f32s, bit1: S::u32s) -> S::f32s {
+    let sign = simd.wrapping_dyn_shl_u32s(bit1, simd.splat_u32s(30));
+    simd.transmute_f32s_u32s(simd.xor_u32s(simd.transmute_u32s_f32s(value), sign))
 }
 
 /// eˣ, held between the smallest normal number and 3.0e38, so that finite input gives finite output.
@@ -61,11 +66,14 @@ pub(super) fn exp<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
     let n = simd.sub_u32s(bits, low);
     let half = simd.wrapping_dyn_shr_u32s(simd.add_u32s(n, simd.splat_u32s(256)), simd.splat_u32s(1));
     let half = simd.sub_u32s(half, simd.splat_u32s(128));
-    let power = |n: S::u32s| {
-        let biased = simd.add_u32s(n, simd.splat_u32s(127));
-        simd.transmute_f32s_u32s(simd.wrapping_dyn_shl_u32s(biased, simd.splat_u32s(23)))
-    };
-    simd.mul_f32s(simd.mul_f32s(mantissa, power(half)), power(simd.sub_u32s(n, half)))
+    simd.mul_f32s(simd.mul_f32s(mantissa, power(simd, half)), power(simd, simd.sub_u32s(n, half)))
+}
+
+/// 2ⁿ of a two's complement n from −126 to 127.
+#[inline(always)]
+fn power<S: Simd>(simd: S, n: S::u32s) -> S::f32s {
+    let biased = simd.add_u32s(n, simd.splat_u32s(127));
+    simd.transmute_f32s_u32s(simd.wrapping_dyn_shl_u32s(biased, simd.splat_u32s(23)))
 }
 
 /// Σ cᵢ xⁱ by Horner's rule.

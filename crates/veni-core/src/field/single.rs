@@ -50,32 +50,36 @@ fn first<V: pulp::bytemuck::Pod>(vector: V) -> f32 {
 /// Five features of each directional input, as in `block`, a lane per input.
 #[inline(always)]
 fn encode<S: Simd>(simd: S, folded: &Folded, direction: [f32; 3], features: &mut [f32]) {
-    let [x, y, z] = direction.map(|c| simd.splat_f32s(c));
+    let [x, y, z] = direction;
+    let (x, y, z) = (simd.splat_f32s(x), simd.splat_f32s(y), simd.splat_f32s(z));
     let radius = simd.sqrt_f32s(simd.mul_add_f32s(x, x, simd.mul_f32s(y, y)));
     let lanes = S::F32_LANES;
-    let mut write = |from: usize, count: usize, value: S::f32s, turns: S::f32s| {
-        let [sin1, cos1] = math::sin_cos_turns(simd, turns);
-        let [sin4, cos4] = math::sin_cos_turns(simd, simd.mul_f32s(turns, simd.splat_f32s(4.0)));
-        let columns = [sin1, sin4, cos1, cos4, value];
-        let columns: &[f32] = bytemuck::cast_slice(&columns);
-        for i in 0..count {
-            for k in 0..5 {
-                features[5 * (from + i) + k] = columns[k * lanes + i];
-            }
-        }
-    };
-    for (group, vectors) in folded.vectors.chunks(lanes).enumerate() {
+    for (vectors, features) in folded.vectors.chunks(lanes).zip(features.chunks_mut(5 * lanes)) {
         let mut both = [simd.splat_f32s(0.0); 2];
         let flat: &mut [f32] = bytemuck::cast_slice_mut(&mut both);
         for (i, [a, b]) in vectors.iter().enumerate() {
             (flat[i], flat[lanes + i]) = (*a, *b);
         }
         let (value, turns) = inner_product(simd, both, [x, y]);
-        write(group * lanes, vectors.len(), value, turns);
+        write(simd, &mut features[..5 * vectors.len()], value, turns);
     }
     let n = folded.vectors.len();
-    write(n, 1, z, z);
-    write(n + 1, 1, radius, radius);
+    write(simd, &mut features[5 * n..5 * (n + 1)], z, z);
+    write(simd, &mut features[5 * (n + 1)..], radius, radius);
+}
+
+/// The features of as many inputs as there is room for, at most one per lane.
+#[inline(always)]
+fn write<S: Simd>(simd: S, features: &mut [f32], value: S::f32s, turns: S::f32s) {
+    let [sin1, cos1] = math::sin_cos_turns(simd, turns);
+    let [sin4, cos4] = math::sin_cos_turns(simd, simd.mul_f32s(turns, simd.splat_f32s(4.0)));
+    let columns = [sin1, sin4, cos1, cos4, value];
+    let columns: &[f32] = bytemuck::cast_slice(&columns);
+    for (i, features) in features.chunks_exact_mut(5).enumerate() {
+        for (k, feature) in features.iter_mut().enumerate() {
+            *feature = columns[k * S::F32_LANES + i];
+        }
+    }
 }
 
 #[inline(always)]

@@ -159,3 +159,6 @@ impl Model {
         Self::from_bytes(include_bytes!("../../../../assets/veni-27.safetensors")).expect("embedded model")
     }
 }
+
+#[cfg(test)]
+mod tests;

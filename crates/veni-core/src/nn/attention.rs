@@ -78,9 +78,9 @@ impl VectorAttention {
     /// - output: as `from`
     pub fn forward_from(&self, from: Tensor<4>, x: Tensor<4>, keep: Option<Tensor<2, Bool>>) -> Tensor<4> {
         let coordinates = x.dims()[COORDINATE];
-        let q = self.to_heads(self.query.forward(from));
-        let k = self.to_heads(self.key.forward(x.clone()));
-        let v = self.to_heads(self.value.forward(x));
+        let q = self.split_heads(self.query.forward(from));
+        let k = self.split_heads(self.key.forward(x.clone()));
+        let v = self.split_heads(self.value.forward(x));
         let [batch, heads, tokens, width] = k.dims();
         let mut logits = q.matmul(k.transpose()) * (1.0 / (width as f64).sqrt());
         if let Some(keep) = keep {
@@ -90,11 +90,11 @@ impl VectorAttention {
             // Finite, so that a row without any kept token stays finite too.
             logits = logits.mask_fill(hidden, f32::MIN);
         }
-        self.out.forward(self.from_heads(softmax(logits, 3).matmul(v), coordinates))
+        self.out.forward(self.join_heads(softmax(logits, 3).matmul(v), coordinates))
     }
 
     /// `[batch, token, coordinate, heads · h]` to `[batch, heads, token, coordinate · h]`.
-    fn to_heads(&self, x: Tensor<4>) -> Tensor<4> {
+    fn split_heads(&self, x: Tensor<4>) -> Tensor<4> {
         let [batch, tokens, coordinates, inner] = x.dims();
         let head = inner / self.heads;
         x.reshape([batch, tokens, coordinates, self.heads, head]).permute([0, 3, 1, 2, 4]).reshape([
@@ -105,8 +105,8 @@ impl VectorAttention {
         ])
     }
 
-    /// The inverse of [`to_heads`](Self::to_heads).
-    fn from_heads(&self, x: Tensor<4>, coordinates: usize) -> Tensor<4> {
+    /// The inverse of [`split_heads`](Self::split_heads).
+    fn join_heads(&self, x: Tensor<4>, coordinates: usize) -> Tensor<4> {
         let [batch, heads, tokens, width] = x.dims();
         let head = width / coordinates;
         x.reshape([batch, heads, tokens, coordinates, head]).permute([0, 2, 3, 1, 4]).reshape([

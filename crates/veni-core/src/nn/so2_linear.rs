@@ -4,7 +4,7 @@ use super::init::uniform;
 use super::norm::{COORDINATE, coordinate_norm};
 use super::vn_linear::matmul_channels;
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
 
 /// Sizes of a [`So2Linear`].
@@ -120,6 +120,28 @@ impl So2Linear {
         So2Feature {
             equivariant: matmul_channels(x.equivariant_terms(), self.equivariant.val()),
             invariant: self.forward_invariant(x),
+        }
+    }
+
+    /// The layer that gives for inputs of `channels` channels with x, y and the first invariant (z) negated what
+    /// this one gives for the inputs themselves.
+    ///
+    /// Of the products t_k,i x_i all change sign but z x_i; of the numbers s_k,i only z does. These rows of We
+    /// and Wi are negated, so the results are the same to the bit.
+    pub(crate) fn for_negated_directions(self, channels: usize) -> Self {
+        let rewrite = |weights: Param<Tensor<2>>, negated: fn(usize) -> bool| {
+            weights.map(|w| {
+                let (terms, device, tracked) = (w.dims()[0], w.device(), w.is_require_grad());
+                let sign = |row: usize| if negated(row / channels) { -1f32 } else { 1.0 };
+                let signs = TensorData::new((0..terms).map(sign).collect(), [terms, 1]);
+                Tensor::from_data((w * Tensor::from_data(signs, &device)).into_data(), &device)
+                    .set_require_grad(tracked)
+            })
+        };
+        Self {
+            equivariant: rewrite(self.equivariant, |k| k != 1),
+            invariant: rewrite(self.invariant, |k| k == 0),
+            bias: self.bias,
         }
     }
 

@@ -137,7 +137,9 @@ pub(crate) fn assert_gradients<M: Module>(
         let at = |step| value(&module, nudged(x.clone(), index, step));
         check("input", index, gradient, (at(step) - at(-step)) / (2.0 * step));
     }
-    for (index, &gradient) in by_parameter.iter().enumerate() {
+    // Of many parameters a sample that meets every layer: one of every 37, 37 being prime to the usual sizes.
+    let stride = if by_parameter.len() > 400 { 37 } else { 1 };
+    for (index, &gradient) in by_parameter.iter().enumerate().step_by(stride) {
         let at = |step| {
             let moved = module.clone().map(&mut Nudge { index, seen: 0, step });
             value(&moved, x.clone())

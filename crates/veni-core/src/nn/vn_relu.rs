@@ -112,13 +112,10 @@ mod tests {
         let y = vn_relu(q.clone(), k.clone(), VnReluForm::Projection);
         let least = (y.clone() * k.clone()).sum_dim(2).min().into_scalar::<f32>();
         assert!(least > -1e-5, "{least}");
-        // the single normalisation overshoots or falls short
-        let z = vn_relu(q.clone(), k.clone() * 3.0, VnReluForm::Reference);
-        assert!(
-            (z * k.clone()).sum_dim(2).min().into_scalar::<f32>().abs() > 1e-3
-                || max_difference(y.clone(), vn_relu(q.clone(), k.clone() * 3.0, VnReluForm::Reference))
-                    > 1e-2
-        );
+        // a longer k changes what the single normalisation subtracts, and not the projection
+        let longer = |form| vn_relu(q.clone(), k.clone() * 3.0, form);
+        assert!(max_difference(longer(VnReluForm::Projection), y.clone()) < 1e-5);
+        assert!(max_difference(longer(VnReluForm::Reference), y.clone()) > 1e-2);
         assert!(max_difference(vn_relu(q * 7.0, k * 7.0, VnReluForm::Projection), y * 7.0) < 1e-4);
     }
 

@@ -58,6 +58,21 @@ fn exr_float_is_exact_and_half_is_rounded() {
 }
 
 #[test]
+fn the_same_image_gives_the_same_file() {
+    let dir = folder();
+    let mut with = options(WriteFormat::Exr(Precision::Half));
+    for name in ["e", "d", "a", "c", "b"] {
+        with.attributes.insert(name.into(), name.to_uppercase());
+    }
+    let write = |name: &str| {
+        sky(16, 8).write(dir.path().join(name), &with).unwrap();
+        fs::read(dir.path().join(name)).unwrap()
+    };
+    let first = write("0.exr");
+    assert!((1..10).all(|k| write(&format!("{k}.exr")) == first));
+}
+
+#[test]
 fn written_exr_has_the_promised_header() {
     let dir = folder();
     let path = dir.path().join("sky.exr");

@@ -92,19 +92,22 @@ fn small(latent_vectors: usize) -> TrainConfig {
         data: DataConfig::default(),
         augment: varied(),
         loss_grid: LossGrid::Strided { factor: 2 },
-        // the gradient term is lighter than the paper's: 27 numbers cannot follow edges. What a viewer sees
-        // (clamped, tonemapped) is asked for directly
+        // The gradient term is lighter than the paper's: 27 numbers cannot follow edges. What a viewer sees
+        // (clamped, tonemapped) is asked for directly, and the colour of the logarithm, which has no meaning
+        // near radiance 1, hardly counts. The divergence weighs double: overfitting is the enemy.
         loss: LossConfig {
-            mage: WeightSchedule::Constant(0.05),
-            ldr_mse: WeightSchedule::Constant(4.0),
+            mage: WeightSchedule::Constant(0.1),
+            cosine: WeightSchedule::Constant(0.1),
+            kld: WeightSchedule::Constant(0.02),
+            ldr_mse: WeightSchedule::Constant(15.0),
             ..LossConfig::default()
         },
-        decoder: group(1e-3, [200, steps], 0.01, adam),
+        decoder: group(1e-3, [200, steps], 0.01, AdamConfig { weight_decay: 0.01, ..adam }),
         encoder: group(1e-3, [200, steps], 0.01, adam),
         report: ReportConfig {
-            validate_every: 250,
-            preview_every: 500,
-            checkpoint_every: 250,
+            validate_every: 500,
+            preview_every: 1000,
+            checkpoint_every: 500,
             train_subset: 8,
             prior_copies: 4,
             stored: Stored::F16,

@@ -131,7 +131,9 @@ impl WeightSchedule {
                 let u = if step <= start_step { 0.0 } else { fraction(step, start_step, end_step).min(1.0) };
                 start_weight + (end_weight - start_weight) * u
             }
-            Self::Sigmoid { centre, width, weight } => weight / (1.0 + (-(step as f64 - centre) / width).exp()),
+            Self::Sigmoid { centre, width, weight } => {
+                weight / (1.0 + (-(step as f64 - centre) / width).exp())
+            }
         }
     }
 

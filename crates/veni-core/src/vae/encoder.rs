@@ -130,6 +130,24 @@ impl Encoder {
         FoldedEncoder { encoder: self, gates }
     }
 
+    /// The encoder that gives for directions −d the very numbers that this one gives for d: for weights that were
+    /// trained on the opposite directions. Only the first layer is rewritten.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where `project_in` is a Vector-Neuron layer: there the colours share the weights of
+    /// the directions and keep their sign.
+    pub fn for_negated_directions(self) -> Result<Self> {
+        let VectorLinear::So2(project_in) = self.project_in else {
+            return Err(Error::unsupported(
+                "encoder: a Vector-Neuron project_in cannot be rewritten for negated directions; negate the \
+                 directions it is given",
+            ));
+        };
+        let channels = self.config.samples.unwrap_or(1);
+        let project_in = VectorLinear::So2(project_in.for_negated_directions(channels));
+        Ok(Self { project_in, ..self })
+    }
+
     fn run(&self, directions: Tensor<4>, log_radiance: Tensor<4>, gates: Option<&FoldedGates>) -> Posterior {
         let tokens = self.project_in.forward(self.samples_as_channels(directions, log_radiance));
         let token = match self.config.pooling {

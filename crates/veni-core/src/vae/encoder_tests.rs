@@ -145,14 +145,35 @@ fn folding_and_own_directions_change_nothing() {
 }
 
 #[test]
+fn weights_for_the_opposite_directions() {
+    let device = Device::flex();
+    let radiance = features([1, STRIPES, SAMPLES, 3], 2, &device);
+    for (name, config) in variants() {
+        let encoder = encoder(&config, &device);
+        let straight = encoder.forward(grid(&device), radiance.clone());
+        match encoder.for_negated_directions() {
+            Ok(rewritten) => {
+                let opposite = rewritten.forward(grid(&device).neg(), radiance.clone());
+                assert_eq!(relative(&opposite.mean, &straight.mean), 0.0, "{name}");
+            }
+            Err(error) => {
+                assert!(
+                    config.project_in == VectorLayer::Vn && error.to_string().contains("negate"),
+                    "{name}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn gradients_of_every_variant() {
     let device = Device::flex().autodiff();
     let device_grid = grid(&device).narrow(0, 0, 2).narrow(1, 0, 2);
-    for (name, config) in variants() {
+    for (_, config) in variants() {
         let samples = config.samples.map(|_| 2);
         let tiny = EncoderConfig { samples, channels: 2, heads: 1, head_channels: 2, depth: 1, ..config };
         let encoder = encoder(&tiny, &device);
-        println!("{name}");
         assert_gradients(encoder, features([1, 2, 2, 3], 3, &device), |encoder, radiance| {
             let directions = device_grid.clone().cast(radiance.dtype());
             let Posterior { mean, log_variance } = encoder.forward(directions, radiance);

@@ -47,7 +47,11 @@ pub fn log_factor(prediction: &[f32], target: &[f32]) -> f64 {
 /// If the lengths differ or are no multiple of `height`.
 pub fn exposure_offset(prediction: &[f32], target: &[f32], height: usize) -> f64 {
     assert_eq!(prediction.len(), target.len(), "two images of different size");
-    assert!(height > 0 && prediction.len().is_multiple_of(height), "{} values in {height} rows", prediction.len());
+    assert!(
+        height > 0 && prediction.len().is_multiple_of(height),
+        "{} values in {height} rows",
+        prediction.len()
+    );
     let row = prediction.len() / height;
     if row == 0 {
         return 0.0;

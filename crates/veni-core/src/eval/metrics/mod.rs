@@ -4,15 +4,15 @@
 
 mod alignment;
 mod correlation;
-mod display;
 mod psnr;
 mod ssim;
 
 pub use alignment::{Alignment, exposure_offset, log_factor};
 pub use correlation::{pearson, ranks, spearman};
-pub use display::{display, quantile, srgb};
 pub use psnr::psnr;
 pub use ssim::ssim;
+
+use crate::panorama::tonemap::srgb_q98;
 
 /// How close a prediction is to its target. Higher is better throughout.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,17 +29,26 @@ pub struct Scores {
 
 /// Compares two images of log radiance, [height][width][3].
 ///
-/// The prediction is aligned first, both are exponentiated, and for display values each image is divided
-/// by its own 98 % quantile and put through the sRGB curve, clamped to [0, 1]. No solid-angle weights, as
-/// in the papers.
+/// The prediction is aligned first and both are exponentiated; display values are those of [`srgb_q98`],
+/// each image under its own white. No solid-angle weights, as in the papers.
 ///
 /// # Panics
 /// If a length is not height · width · 3.
-pub fn scores(prediction: &[f32], target: &[f32], height: usize, width: usize, alignment: Alignment) -> Scores {
+pub fn scores(
+    prediction: &[f32],
+    target: &[f32],
+    height: usize,
+    width: usize,
+    alignment: Alignment,
+) -> Scores {
     let shape = [height, width, 3];
     let aligned = alignment.apply(prediction, target, height);
-    let (p, i): (Vec<f64>, Vec<f64>) =
-        (aligned.iter().map(|v| v.exp()).collect(), target.iter().map(|v| f64::from(*v).exp()).collect());
+    let p: Vec<f64> = aligned.iter().map(|v| v.exp()).collect();
+    let i: Vec<f64> = target.iter().map(|v| f64::from(*v).exp()).collect();
+    let display = |radiance: &[f64]| -> Vec<f64> {
+        let radiance: Vec<f32> = radiance.iter().map(|v| *v as f32).collect();
+        srgb_q98(&radiance).0.into_iter().map(f64::from).collect()
+    };
     let (p_ldr, i_ldr) = (display(&p), display(&i));
     Scores {
         psnr_hdr: psnr(&p, &i),

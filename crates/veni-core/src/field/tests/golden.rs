@@ -23,9 +23,7 @@ struct Case {
 
 impl Case {
     fn read(name: &str) -> Self {
-        let folder = std::env::var_os("VENI_GOLDEN_DIR").map(PathBuf::from);
-        let folder =
-            folder.unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden"));
+        let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden");
         let bytes = std::fs::read(folder.join(format!("{name}.safetensors"))).unwrap();
         let (_, metadata) = SafeTensors::read_metadata(&bytes).unwrap();
         let entry = |key: &str| -> Value {

@@ -1,6 +1,8 @@
 //! OpenEXR as scan lines in increasing order with ZIP compression, blocks compressed on all cores.
 
+use std::collections::HashMap;
 use std::fs::File;
+use std::hash::RandomState;
 use std::io::BufWriter;
 use std::path::Path;
 
@@ -82,7 +84,7 @@ fn header(grid: Equirect, precision: Precision, factor: f32, options: &WriteOpti
     // alphabetical, as the format demands
     let channels = ["B", "G", "R"].map(|name| ChannelDescription::new(name, sample_type, false));
     let mut attributes = LayerAttributes {
-        environment_map: Some(EnvironmentMap::LatitudeLongitude),
+        environment_map: options.latlong.then_some(EnvironmentMap::LatitudeLongitude),
         software_name: Some(Text::from(SOFTWARE)),
         ..LayerAttributes::default()
     };
@@ -102,6 +104,7 @@ fn header(grid: Equirect, precision: Precision, factor: f32, options: &WriteOpti
     if factor != 1.0 {
         attributes.other.insert(text(RADIANCE_SCALE)?, AttributeValue::Text(text(&factor.to_string())?));
     }
+    attributes.other = in_order(&attributes.other);
     let mut header =
         Header::new(Text::from(""), Vec2(grid.width, grid.height), channels.into_iter().collect())
             .with_attributes(attributes)
@@ -109,6 +112,21 @@ fn header(grid: Equirect, precision: Precision, factor: f32, options: &WriteOpti
     let [red, green, blue, white] = REC709.0.map(|[x, y]| Vec2(x as f32, y as f32));
     header.shared_attributes.chromaticities = Some(Chromaticities { red, green, blue, white });
     Ok(header)
+}
+
+/// How often a map is drawn: on average k! draws bring k attributes into order, so this serves six or seven.
+const DRAWS: usize = 20_000;
+
+/// The exr crate keeps attributes in a hash map and writes them in its order, which is random. Maps are drawn until
+/// the order is alphabetical, so that the same image gives the same file; with more attributes than ours only their
+/// order varies.
+fn in_order(attributes: &HashMap<Text, AttributeValue>) -> HashMap<Text, AttributeValue> {
+    // names alone are cheap to try; a map with the same hasher, filled in the same way, has the same order
+    let names = || attributes.keys().map(|name| (name.clone(), ()));
+    let hasher = (0..DRAWS).map(|_| names().collect::<HashMap<_, _>>()).find(|map| map.keys().is_sorted());
+    let mut ordered = HashMap::with_hasher(hasher.map_or_else(RandomState::new, |map| map.hasher().clone()));
+    ordered.extend(attributes.iter().map(|(name, value)| (name.clone(), value.clone())));
+    ordered
 }
 
 /// EXR text is bytes without an encoding; UTF-8 is what other software expects.

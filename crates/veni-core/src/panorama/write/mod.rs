@@ -85,16 +85,20 @@ pub struct WriteOptions {
     pub attributes: BTreeMap<String, String>,
     /// Whether an existing file may be replaced.
     pub overwrite: Overwrite,
+    /// Whether the rows are a latitude–longitude panorama, as an EXR file then says; otherwise (cube faces, charts)
+    /// it says nothing about directions.
+    pub latlong: bool,
 }
 
 impl WriteOptions {
-    /// This format, nothing out of range, no attributes, no overwriting.
+    /// This format for a panorama; nothing out of range, no attributes, no overwriting.
     pub fn new(format: WriteFormat) -> Self {
         Self {
             format,
             half_range: HalfRange::Refuse,
             attributes: BTreeMap::new(),
             overwrite: Overwrite::Refuse,
+            latlong: true,
         }
     }
 }

@@ -44,7 +44,8 @@ impl Mage {
             let grid = Grid { size: [height, width], channels: 3, factor, coarsen, horizontal_edge };
             let filters = [SCHARR_HORIZONTAL, SCHARR_VERTICAL].map(|k| Filter::new(k, grid, device));
             let coarse = coarsen.count(height, factor);
-            let inner = rows::solid_angle(coarse, device).narrow(1, 1, coarse - 2).reshape([1, coarse - 2, 1]);
+            let inner =
+                rows::solid_angle(coarse, device).narrow(1, 1, coarse - 2).reshape([1, coarse - 2, 1]);
             Scale { filters, weights: inner.clone() / inner.mean().unsqueeze() }
         };
         Self { scales: (0..scales).map(scale).collect() }
@@ -127,9 +128,8 @@ pub fn reference_planes(
 pub fn reference(prediction: Tensor<4>, target: Tensor<4>, scales: usize) -> Tensor<1> {
     let [batch, height, width, channels] = prediction.dims();
     let mask = rows::reference(height, &prediction.device());
-    let planes = |x: Tensor<4>| {
-        (x * mask.clone()).permute([0, 3, 2, 1]).reshape([batch * channels, width, height])
-    };
+    let planes =
+        |x: Tensor<4>| (x * mask.clone()).permute([0, 3, 2, 1]).reshape([batch * channels, width, height]);
     reference_planes(planes(prediction), planes(target), Operator::Scharr, scales, false)
 }
 

@@ -15,8 +15,7 @@ pub const SCHARR_VERTICAL: Stencil = &[([-1.0, 0.0, 1.0], [3.0, 10.0, 3.0])];
 pub const REFERENCE_VERTICAL: Stencil =
     &[([1.0, 0.0, 0.0], [-3.0, 10.0, -3.0]), ([0.0, 0.0, 1.0], [3.0, 10.0, 3.0])];
 /// The five-point Laplacian.
-pub const LAPLACE: Stencil =
-    &[([0.0, 1.0, 0.0], [1.0, -2.0, 1.0]), ([1.0, -2.0, 1.0], [0.0, 1.0, 0.0])];
+pub const LAPLACE: Stencil = &[([0.0, 1.0, 0.0], [1.0, -2.0, 1.0]), ([1.0, -2.0, 1.0], [0.0, 1.0, 0.0])];
 
 /// What happens at the ends of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -162,7 +161,8 @@ mod tests {
     #[test]
     fn filters_agree_with_a_plain_loop() {
         let (height, width, channels) = (8, 10, 2);
-        let value = |j: usize, i: usize, c: usize| (1.3 * j as f64 + 0.7 * (i * i) as f64 + 2.0 * c as f64).sin();
+        let value =
+            |j: usize, i: usize, c: usize| (1.3 * j as f64 + 0.7 * (i * i) as f64 + 2.0 * c as f64).sin();
         let mut data = Vec::new();
         for j in 0..height {
             for i in 0..width {
@@ -173,7 +173,8 @@ mod tests {
         let planes = Tensor::from_data(TensorData::new(data, [1, height, width * channels]), &device);
         for coarsen in [Coarsen::Stride, Coarsen::Average] {
             for edge in [Edge::Valid, Edge::Periodic] {
-                let grid = Grid { size: [height, width], channels, factor: 2, coarsen, horizontal_edge: edge };
+                let grid =
+                    Grid { size: [height, width], channels, factor: 2, coarsen, horizontal_edge: edge };
                 let out = Filter::new(REFERENCE_VERTICAL, grid, &device).apply(planes.clone());
                 let columns = if edge == Edge::Valid { 3 } else { 5 };
                 assert_eq!(out.dims(), [1, 2, columns * channels]);

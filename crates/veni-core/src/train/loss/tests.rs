@@ -59,7 +59,11 @@ fn corrected_terms_do_not_see_a_factor_and_reference_terms_do() {
     let corrected = |p: Tensor<4>| terms(&all_on(LossForm::Corrected), p, image(0.0));
     for ((name, before), (_, after)) in corrected(image(0.3)).into_iter().zip(corrected(brighter.clone())) {
         let invariant = ["mage", "scale_invariant", "cosine"].contains(&name);
-        assert_eq!(invariant, (before - after).abs() < 1e-5 * before.abs().max(1.0), "{name}: {before} {after}");
+        assert_eq!(
+            invariant,
+            (before - after).abs() < 1e-5 * before.abs().max(1.0),
+            "{name}: {before} {after}"
+        );
     }
     let reference = |p: Tensor<4>| terms(&all_on(LossForm::Reference), p, image(0.0));
     for ((name, before), (_, after)) in reference(image(0.3)).into_iter().zip(reference(brighter)) {
@@ -151,7 +155,8 @@ fn a_mask_leaves_out_what_it_covers() {
         2,
     );
     let (p, i) = (image(0.2), image(0.0));
-    let spoiled = Tensor::cat(vec![p.clone().narrow(2, 0, W / 2), p.clone().narrow(2, W / 2, W / 2) + 9.0], 2);
+    let spoiled =
+        Tensor::cat(vec![p.clone().narrow(2, 0, W / 2), p.clone().narrow(2, W / 2, W / 2) + 9.0], 2);
     let rows = rows::solid_angle(H, &device);
     let error = |p: Tensor<4>, mask| {
         number(mse::mse(LossForm::Corrected, Space::Log, p, i.clone(), rows.clone(), mask))

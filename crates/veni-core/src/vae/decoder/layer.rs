@@ -85,13 +85,13 @@ impl Layer {
     }
 
     /// The input of the layer after this one: γ₂ x̂ + (β₂ + that layer's attention output [B, h]).
-    pub(super) fn into_next(&self, x: Tensor<3>, attention: Tensor<2>) -> Tensor<3> {
+    pub(super) fn next_input(&self, x: Tensor<3>, attention: Tensor<2>) -> Tensor<3> {
         let offset = attention + self.norm2.beta.val().unsqueeze();
         x * self.norm2.gamma.val().unsqueeze() + offset.unsqueeze_dim(1)
     }
 
     /// The final linear map of γ₂ x̂ + β₂.
-    pub(super) fn into_output(&self, x: Tensor<3>, output: &Linear) -> Tensor<3> {
+    pub(super) fn read_out(&self, x: Tensor<3>, output: &Linear) -> Tensor<3> {
         let (weight, bias) = self.norm2.fold(output);
         module::linear(x, weight, Some(bias))
     }

@@ -87,7 +87,12 @@ impl Decoder {
     ///
     /// # Panics
     /// If a shape is none of these.
-    pub fn forward_conditioned(&self, latent: Tensor<3>, condition: Tensor<2>, directions: Tensor<3>) -> Tensor<3> {
+    pub fn forward_conditioned(
+        &self,
+        latent: Tensor<3>,
+        condition: Tensor<2>,
+        directions: Tensor<3>,
+    ) -> Tensor<3> {
         let ([_, n, three], [_, _, coordinates]) = (latent.dims(), directions.dims());
         assert!(
             n == self.latent_vectors() && three == 3 && coordinates == 3,
@@ -102,10 +107,10 @@ impl Decoder {
         let mut x = first.forward(input::encode(&self.input, latent, input::basis(directions), offset));
         let mut previous = first;
         for (layer, attention) in rest.iter().zip(attention) {
-            x = layer.forward(previous.into_next(x, attention));
+            x = layer.forward(previous.next_input(x, attention));
             previous = layer;
         }
-        previous.into_output(x, &self.output)
+        previous.read_out(x, &self.output)
     }
 }
 

@@ -15,9 +15,9 @@ fn decoder(form: VnReluForm, device: &Device) -> Decoder {
     Decoder::new(&config, N, &mut ChaCha8Rng::seed_from_u64(7), device)
 }
 
-/// Latents of two images.
+/// Latents of two images, at which no ReLU of the test network is within a finite difference of its kink.
 fn latent(device: &Device) -> Tensor<3> {
-    let values: Vec<f32> = (0..2 * N * 3).map(|i| (1.3 * i as f32 + 0.4).sin() * 1.5).collect();
+    let values: Vec<f32> = (0..2 * N * 3).map(|i| (1.3 * i as f32 + 0.9).sin() * 1.5).collect();
     Tensor::from_data(TensorData::new(values, [2, N, 3]), device)
 }
 
@@ -50,7 +50,8 @@ fn turning_or_mirroring_the_latent_turns_or_mirrors_the_image() {
             let (s, c) = angle.sin_cos();
             for sign in [1.0, -1.0] {
                 let m = matrix([[c, s, 0.0], [-s * sign, c * sign, 0.0], [0.0, 0.0, 1.0]], &device);
-                let turned = decoder.forward(rotate(latent(&device), m.clone()), directions(&device).matmul(m));
+                let turned =
+                    decoder.forward(rotate(latent(&device), m.clone()), directions(&device).matmul(m));
                 let difference = largest_difference(&expected, &turned);
                 assert!(difference < 1e-5, "{form:?}, angle {angle}, sign {sign}: {difference}");
             }
@@ -114,7 +115,7 @@ fn latent_gradients_agree_with_finite_differences() {
         let scale = gradient.iter().fold(0.0f32, |m, g| m.max(g.abs()));
         let base = values(&latent(&device));
         for i in 0..base.len() {
-            let step = 2e-3;
+            let step = 5e-4;
             let at = |delta: f32| {
                 let mut z = base.clone();
                 z[i] += delta;
@@ -122,8 +123,8 @@ fn latent_gradients_agree_with_finite_differences() {
                 probe(decoder.forward(z, directions(&device))).into_scalar::<f32>()
             };
             let found = (at(step) - at(-step)) / (2.0 * step);
-            // ReLU kinks and f32 rounding of the difference leave about a percent of the largest entry.
-            assert!((found - gradient[i]).abs() < 2e-2 * scale, "{form:?} {i}: {found} {}", gradient[i]);
+            // What the curvature of the fast encoding and the rounding of the difference leave.
+            assert!((found - gradient[i]).abs() < 1e-2 * scale, "{form:?} {i}: {found} {}", gradient[i]);
         }
     }
 }

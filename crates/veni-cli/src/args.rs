@@ -1,0 +1,110 @@
+//! The command line as a whole, and the arguments that several commands share.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::commands;
+
+/// Everything that can be typed.
+#[derive(Debug, Parser)]
+#[command(
+    name = "veni-cli",
+    version,
+    about = "Natural light for renderers, from a learned prior of outdoor skies",
+    long_about = "Natural light for renderers, from a learned prior of outdoor skies.\n\n\
+        VENI turns an HDR environment map into a few vectors (a latent) that rotate with it, and a latent \
+        back into radiance for any direction. This tool bakes skies to image files, encodes panoramas, \
+        trains models and shows what is inside files.",
+    after_help = "Results are printed on stdout, everything else on stderr.\n\
+        Exit codes: 0 fine; 1 ran, but stopped early or the answer is no; 2 error.\n\n\
+        Examples:\n  \
+        veni-cli bake --seed 7 -o sky.exr             a random sky\n  \
+        veni-cli sample -o sheet.png                  sixteen random skies on one sheet\n  \
+        veni-cli inspect sky.exr                      size, range, sun, the latent inside\n\n\
+        'veni-cli help COMMAND' explains a command.",
+    propagate_version = true
+)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+
+    /// Print each result as one line of JSON
+    #[arg(long, global = true, display_order = 900)]
+    pub(crate) json: bool,
+
+    /// Print results and errors only: no progress, no notes
+    #[arg(long, short, global = true, display_order = 901)]
+    pub(crate) quiet: bool,
+}
+
+/// The commands, in the order of `--help`.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Bake(commands::bake::Bake),
+    Sample(commands::sample::Sample),
+    #[cfg(feature = "learn")]
+    Encode(commands::encode::Encode),
+    Inspect(commands::inspect::Inspect),
+    #[cfg(feature = "learn")]
+    Train(commands::train::Train),
+    Completions(commands::completions::Completions),
+    Man(commands::man::Man),
+}
+
+/// Which model decodes (and encodes).
+#[derive(Args, Debug)]
+pub(crate) struct ModelArgs {
+    /// Model file (.safetensors, or a training run's folder) [default: the one inside this program]
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) model: Option<PathBuf>,
+}
+
+/// Whether existing files may be replaced.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Force {
+    /// Replace output files that exist
+    #[arg(long, short)]
+    pub(crate) force: bool,
+}
+
+impl From<Force> for veni_core::output::Overwrite {
+    fn from(f: Force) -> Self {
+        if f.force { Self::Replace } else { Self::Refuse }
+    }
+}
+
+/// What decodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DecodeDevice {
+    /// The fastest one at hand: the CPU in this build
+    #[default]
+    Auto,
+    /// All CPU cores
+    Cpu,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_and_argument_is_explained() {
+        let mut cli = Cli::command();
+        cli.build();
+        for command in cli.get_subcommands().filter(|c| c.get_name() != "help") {
+            let name = command.get_name();
+            assert!(command.get_about().is_some(), "{name} has no description");
+            assert!(command.get_after_help().is_some(), "{name} shows no examples");
+            for argument in command.get_arguments() {
+                assert!(argument.get_help().is_some(), "{name}: {} is not explained", argument.get_id());
+            }
+        }
+    }
+}

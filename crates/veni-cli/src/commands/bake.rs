@@ -1,0 +1,261 @@
+//! `veni-cli bake`: a latent to image files.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Result, bail};
+use clap::{ArgGroup, Args, ValueEnum};
+use serde_json::json;
+use veni_core::latent::Latent;
+use veni_core::output::Overwrite;
+use veni_core::panorama::tonemap::{Curve, Tonemap};
+use veni_core::panorama::{Precision, WriteFormat, WriteOptions};
+
+use crate::args::{DecodeDevice, Force, ModelArgs};
+use crate::output::{self, with_remedy};
+use crate::picture::{Picture, preview_tonemap};
+use crate::progress::Progress;
+use crate::report::{Outcome, Report};
+use crate::size::Size;
+use crate::source;
+
+/// The largest finite half-precision number.
+const HALF_MAX: f32 = 65504.0;
+
+/// Largest |exposure|. Light that is 2^64 brighter than a sky is no light, and close to what an f32 can hold.
+const MAX_STOPS: f64 = 64.0;
+
+/// Stands where no PNG is written.
+const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
+
+/// Bake a sky to image files
+#[derive(Args, Debug)]
+#[command(
+    group = ArgGroup::new("sky").required(true),
+    long_about = "Bake a sky to image files.\n\n\
+        The sky is a latent: a latent file (JSON), an image that this program baked (its latent is inside), an HDR \
+        panorama (encoded on the fly), or a random one named by --seed. The same seed and model give the same sky \
+        for ever.\n\n\
+        Formats by extension: .exr (linear, half or float), .hdr (Radiance RGBE), .png (tonemapped preview). An \
+        EXR or HDR file carries its latent and the model's hash, so that it can be baked again at any size.",
+    after_help = "Cube maps: six square faces stacked from top to bottom in the order +X -X +Y -Y +Z -Z of --frame, \
+        each oriented as the layers of a cube texture in Vulkan, Direct3D, Metal, OpenGL and WebGPU; the attribute \
+        veni:cubeFaces repeats the order. With --frame bevy, z is negated before the lookup, as Bevy's shaders do. \
+        Default frame: blender (z up); gltf for cube maps (y up).\n\n\
+        Examples:\n  \
+        veni-cli bake --seed 7 -o sky.exr                      a random sky, 1024 x 512, half precision\n  \
+        veni-cli bake --seed 7 -o sky.exr -o sky.png --size 4096\n  \
+        veni-cli bake sky.exr -o turned.exr --turn 90 --exposure -1\n  \
+        veni-cli bake photo.hdr -o relit.exr                   through the encoder\n  \
+        veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512"
+)]
+pub(crate) struct Bake {
+    /// Latent file, baked image, or HDR panorama
+    #[arg(group = "sky")]
+    latent: Option<PathBuf>,
+
+    /// A random sky from the model's prior, named by a number
+    #[arg(long, short, value_name = "S", group = "sky")]
+    seed: Option<u64>,
+
+    /// File to write (.exr, .hdr or .png); may be given several times
+    #[arg(long, short, required = true, value_name = "OUT")]
+    output: Vec<PathBuf>,
+
+    /// Width, or width x height; of one face for cube maps [default: 1024x512, faces of 256]
+    #[arg(long, value_name = "W|WxH")]
+    size: Option<Size>,
+
+    /// Turn the scene about the vertical axis, counter-clockwise seen from above
+    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = finite, allow_hyphen_values = true,
+        hide_default_value = true)]
+    turn: f64,
+
+    /// Make it brighter (or, negative, darker) by factors of two
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = stops, allow_hyphen_values = true,
+        hide_default_value = true)]
+    exposure: f64,
+
+    /// EXR in half precision; fails where radiance exceeds 65504 [default: half if that holds it, else float]
+    #[arg(long, conflicts_with = "float")]
+    half: bool,
+
+    /// EXR in single precision
+    #[arg(long)]
+    float: bool,
+
+    /// Arrangement of directions
+    #[arg(long, value_enum, default_value_t)]
+    layout: Layout,
+
+    /// Axes that a cube map's faces are named by, and that the file says its directions have
+    #[arg(long, value_enum)]
+    frame: Option<FrameName>,
+
+    #[command(flatten)]
+    model: ModelArgs,
+
+    /// What decodes
+    #[arg(long, value_enum, default_value_t)]
+    device: DecodeDevice,
+
+    #[command(flatten)]
+    force: Force,
+}
+
+/// How directions are laid out in the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Layout {
+    /// Latitude and longitude, twice as wide as high
+    #[default]
+    Equirect,
+    /// Six faces, one below the other
+    Cubemap,
+}
+
+/// The frames by the names that are typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FrameName {
+    /// z up, the image's centre looks along +x (also native to this program)
+    Blender,
+    /// y up, centre +x (glTF, three.js)
+    Gltf,
+    /// y up, centre +z (OpenEXR, USD)
+    Openexr,
+    /// y up, centre -z
+    Bevy,
+}
+
+impl Bake {
+    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        let overwrite = Overwrite::from(self.force);
+        output::check(&self.output, &["exr", "hdr", "png"], overwrite)?;
+        let picture = Picture::new(self.layout, self.frame, self.size)?;
+        let loaded = source::model(&self.model)?;
+        let model = &loaded.model;
+        let decoder = match self.device {
+            DecodeDevice::Auto | DecodeDevice::Cpu => model.decoder(),
+        };
+        let named = match (&self.latent, self.seed) {
+            (Some(path), _) => source::from_file(path, &loaded, report)?,
+            (None, Some(seed)) => source::seeded(model, seed),
+            (None, None) => bail!("name a latent or give --seed"),
+        };
+        let latent = self.changed(&named);
+        let started = Instant::now();
+        let field = decoder.condition(&latent)?;
+        let png = self.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")));
+        // the exposure of a preview is that of the sky before --exposure, which would otherwise be undone
+        let tonemap = if png { preview_tonemap(&decoder.condition(&named)?) } else { NEUTRAL };
+        let attributes = picture.attributes(&latent, &model.hash())?;
+        let files = |precision| -> veni_core::Result<Vec<_>> {
+            let file = |path: &PathBuf| {
+                let mut format = WriteFormat::of(path, tonemap)?;
+                if let WriteFormat::Exr(p) = &mut format {
+                    *p = precision;
+                }
+                let attributes = attributes.clone();
+                let latlong = picture.is_latlong();
+                Ok((
+                    path.clone(),
+                    WriteOptions { attributes, overwrite, latlong, ..WriteOptions::new(format) },
+                ))
+            };
+            self.output.iter().map(file).collect()
+        };
+        let (mut precision, may_change) = match (self.half, self.float) {
+            (true, _) => (Precision::Half, false),
+            (_, true) => (Precision::Float, false),
+            _ => (Precision::Half, true),
+        };
+        loop {
+            let (files, mut too_bright) = (files(precision)?, None);
+            let watch = may_change && precision == Precision::Half && has_exr(&files);
+            let mut progress = Progress::start(report, "row", 0, picture.grid().height as u64);
+            let mut done = 0;
+            let result = output::write_all(&files, picture.grid(), &mut |push| {
+                picture.rows(&field, &mut |row| {
+                    if watch
+                        && let Some(v) = row.as_flattened().iter().find(|v| **v > HALF_MAX && v.is_finite())
+                    {
+                        too_bright = Some(*v);
+                        return Err(veni_core::Error::invalid("beyond the range of half precision"));
+                    }
+                    done += 1;
+                    progress.set(done, String::new);
+                    push(row)
+                })
+            });
+            progress.finish();
+            match (result, too_bright) {
+                (_, Some(value)) => {
+                    report.note(format_args!(
+                        "radiance of {value:.0} is beyond half precision ({HALF_MAX}): writing floats"
+                    ));
+                    precision = Precision::Float;
+                }
+                (Err(error @ veni_core::Error::Invalid(_)), None) if self.half => {
+                    bail!("{error} (leave --half out, or darken with --exposure -1 …)")
+                }
+                (Err(error), None) => return Err(with_remedy(error)),
+                (Ok(()), None) => break,
+            }
+        }
+        self.report(&picture, &latent, precision, started, report)?;
+        Ok(Outcome::Fine)
+    }
+
+    /// The latent with `--turn` and `--exposure` in it: what the files record.
+    fn changed(&self, latent: &Latent) -> Latent {
+        let mut latent =
+            if self.turn == 0.0 { latent.clone() } else { latent.turned(self.turn.to_radians()) };
+        latent.log_exposure += (self.exposure * std::f64::consts::LN_2) as f32;
+        latent
+    }
+
+    fn report(
+        &self,
+        picture: &Picture,
+        latent: &Latent,
+        precision: Precision,
+        started: Instant,
+        report: Report,
+    ) -> Result<()> {
+        let seconds = started.elapsed().as_secs_f64();
+        let precision = if precision == Precision::Half { "half" } else { "float" };
+        let from = latent.source.as_deref().unwrap_or("unknown source");
+        let files: Vec<_> = self.output.iter().map(|p| p.display().to_string()).collect();
+        let human = format!("{}: {}, {from} ({seconds:.2} s)", files.join(", "), picture.describe(precision));
+        let grid = picture.grid();
+        let value = json!({
+            "files": files,
+            "width": grid.width,
+            "height": grid.height,
+            "layout": self.layout.to_possible_value().map(|v| v.get_name().to_owned()),
+            "frame": picture.frame_name(),
+            "precision": precision,
+            "latent": serde_json::from_str::<serde_json::Value>(&latent.to_json()?)?,
+            "seconds": seconds,
+        });
+        report.result(human, &value)
+    }
+}
+
+fn has_exr(files: &[(PathBuf, WriteOptions)]) -> bool {
+    files.iter().any(|(_, options)| matches!(options.format, WriteFormat::Exr(_)))
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(v) if v.is_finite() => Ok(v),
+        Ok(_) => Err("the number must be finite".to_owned()),
+        Err(_) => Err("not a number".to_owned()),
+    }
+}
+
+fn stops(text: &str) -> Result<f64, String> {
+    match finite(text)? {
+        v if v.abs() <= MAX_STOPS => Ok(v),
+        _ => Err(format!("more than {MAX_STOPS} stops either way is beyond the range of floats")),
+    }
+}

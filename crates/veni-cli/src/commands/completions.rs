@@ -1,0 +1,35 @@
+//! `veni-cli completions`: tab completion for a shell.
+
+use anyhow::Result;
+use clap::{Args, CommandFactory};
+use clap_complete::{Shell, generate};
+use serde_json::json;
+
+use crate::args::Cli;
+use crate::report::{Outcome, Report, to_stdout};
+
+/// Print tab completions for a shell
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  \
+    veni-cli completions bash > ~/.local/share/bash-completion/completions/veni-cli\n  \
+    veni-cli completions zsh > \"${fpath[1]}/_veni-cli\"\n  \
+    veni-cli completions fish > ~/.config/fish/completions/veni-cli.fish")]
+pub(crate) struct Completions {
+    /// The shell
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+impl Completions {
+    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        let mut script = Vec::new();
+        generate(self.shell, &mut Cli::command(), "veni-cli", &mut script);
+        if report.is_json() {
+            let script = String::from_utf8_lossy(&script);
+            report.result("", &json!({ "shell": self.shell.to_string(), "script": script }))?;
+        } else {
+            to_stdout(&script)?;
+        }
+        Ok(Outcome::Fine)
+    }
+}

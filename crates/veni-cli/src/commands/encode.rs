@@ -1,0 +1,240 @@
+//! `veni-cli encode`: panoramas to latents.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, anyhow, bail};
+use clap::Args;
+use serde_json::json;
+use veni_core::data::Item;
+use veni_core::eval::metrics::{Alignment, Scores, scores};
+use veni_core::field::Field;
+use veni_core::latent::Latent;
+use veni_core::output::Overwrite;
+use veni_core::panorama::Panorama;
+use veni_core::panorama::tonemap::Tonemap;
+use veni_core::sphere::Equirect;
+use veni_core::train::config::DeviceKind;
+use veni_core::vae::Veni;
+use veni_core::{Error, output::refuse_existing};
+
+use crate::args::{Force, ModelArgs};
+use crate::output::{self, with_remedy};
+use crate::progress::Progress;
+use crate::report::{self, Outcome, Report, to_stdout};
+use crate::sheet::Sheet;
+use crate::source::{self, Loaded};
+
+/// The resolution at which a panorama is encoded and scored: that of the training data of the article.
+const GRID: [usize; 2] = [128, 64];
+/// The resolution of a preview.
+const PREVIEW: [usize; 2] = [256, 128];
+
+/// Turn HDR panoramas into latents
+#[derive(Args, Debug)]
+#[command(
+    long_about = "Turn HDR panoramas into latents.\n\n\
+        Panoramas are equirectangular OpenEXR or Radiance files of any size, z up; they are resampled, and their \
+        exposure is taken out and recorded in the latent, so that baking the latent gives the original level. The \
+        result line says how well the latent reproduces the panorama: PSNR of the tonemapped images.",
+    after_help = "Without -o and --out-dir the latent itself goes to stdout, one line of JSON per panorama.\n\n\
+        Examples:\n  \
+        veni-cli encode sky.exr -o sky.json\n  \
+        veni-cli encode sky.exr > sky.json\n  \
+        veni-cli encode *.hdr --out-dir latents --preview pairs.png\n  \
+        veni-cli encode sky.exr -o sky.json && veni-cli bake sky.json -o again.exr"
+)]
+pub(crate) struct Encode {
+    /// Equirectangular OpenEXR or Radiance files
+    #[arg(required = true, value_name = "PANORAMA")]
+    panoramas: Vec<PathBuf>,
+
+    /// Latent file to write, for a single panorama
+    #[arg(long, short, value_name = "OUT.json", conflicts_with = "out_dir")]
+    output: Option<PathBuf>,
+
+    /// Folder for the latents, created if missing; each is named after its panorama
+    #[arg(long, value_name = "DIR")]
+    out_dir: Option<PathBuf>,
+
+    /// Also write a PNG: panorama | reconstruction, one pair per row
+    #[arg(long, value_name = "OUT.png")]
+    preview: Option<PathBuf>,
+
+    #[command(flatten)]
+    model: ModelArgs,
+
+    #[command(flatten)]
+    force: Force,
+}
+
+/// A panorama's latent and how good it is.
+pub(crate) struct Encoded {
+    pub(crate) latent: Latent,
+    pub(crate) scores: Scores,
+    panorama: Panorama,
+    field: Field,
+}
+
+/// A model's encoder, ready.
+pub(crate) struct Encoding<'a> {
+    loaded: &'a Loaded,
+    veni: Veni,
+}
+
+impl<'a> Encoding<'a> {
+    pub(crate) fn new(loaded: &'a Loaded) -> Result<Self> {
+        if !loaded.model.has_encoder() {
+            bail!(
+                "{}: this model has no encoder, it decodes only; name one that has with --model FILE",
+                loaded.name
+            );
+        }
+        let veni = Veni::from_model(&loaded.model, &DeviceKind::Flex.device()?)
+            .map_err(|e| e.in_file(&loaded.name))?;
+        Ok(Self { loaded, veni })
+    }
+
+    /// Reads, encodes, and decodes again to compare.
+    pub(crate) fn encode_file(&self, path: &Path, report: Report) -> Result<Encoded> {
+        let mut panorama = Panorama::read(path)?;
+        let bad = panorama.sanitise().map_err(|e| e.in_file(path))?;
+        if bad.nan + bad.infinite > 0 {
+            report.note(format_args!(
+                "{}: {} values that are not a number and {} infinite ones were replaced",
+                path.display(),
+                bad.nan,
+                bad.infinite
+            ));
+        }
+        let grid = Equirect::new(GRID[0], GRID[1]);
+        let item = Item::new(path, &panorama, grid);
+        let encoded =
+            self.veni.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
+        let vectors = encoded.into_iter().next().map(|e| e.vectors).unwrap_or_default();
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
+        let latent = Latent {
+            vectors,
+            log_exposure: item.log_exposure,
+            model: Some(self.loaded.model.hash()),
+            source: Some(name.unwrap_or_else(|| path.display().to_string())),
+        };
+        let field = self.loaded.model.decoder().condition(&latent).map_err(|e| e.in_file(path))?;
+        let mut decoded = vec![[0.0; 3]; grid.len()];
+        field.log_radiance_batch(&grid.directions(), &mut decoded);
+        let prediction: Vec<f32> = decoded.as_flattened().iter().map(|v| v - item.log_exposure).collect();
+        // the article's protocol, as in training
+        let scores = scores(&prediction, &item.log_radiance, grid.height, grid.width, Alignment::LogFactor);
+        Ok(Encoded { latent, scores, panorama, field })
+    }
+}
+
+impl Encode {
+    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        let overwrite = Overwrite::from(self.force);
+        let outputs = self.outputs(overwrite)?;
+        let loaded = source::model(&self.model)?;
+        let encoding = Encoding::new(&loaded)?;
+        let mut sheet =
+            self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
+        let mut progress = Progress::start(report, "panorama", 0, self.panoramas.len() as u64);
+        let mut failed = Vec::new();
+        for (at, path) in self.panoramas.iter().enumerate() {
+            let encode = || -> Result<Encoded> {
+                let encoded = encoding.encode_file(path, report)?;
+                if let Some(output) = outputs.get(at) {
+                    encoded.latent.save(output, overwrite).map_err(with_remedy)?;
+                }
+                Ok(encoded)
+            };
+            match encode() {
+                Ok(encoded) => {
+                    if let Some(sheet) = &mut sheet {
+                        place(sheet, at, &encoded);
+                    }
+                    print(path, outputs.get(at), &encoded, report)?;
+                }
+                Err(error) => failed.push(error),
+            }
+            progress.set(at as u64 + 1, String::new);
+        }
+        progress.finish();
+        if let Some((sheet, path)) = sheet.zip(self.preview.as_ref())
+            && failed.len() < self.panoramas.len()
+        {
+            sheet.write(path, overwrite).map_err(with_remedy)?;
+        }
+        report::last_of(failed)
+    }
+
+    /// One latent file per panorama, checked; none if the latents go to stdout.
+    fn outputs(&self, overwrite: Overwrite) -> Result<Vec<PathBuf>> {
+        if let Some(preview) = &self.preview {
+            output::check(std::slice::from_ref(preview), &["png"], overwrite)?;
+        }
+        let outputs = match (&self.output, &self.out_dir) {
+            (Some(_), _) if self.panoramas.len() > 1 => {
+                bail!(
+                    "-o names one file for {} panoramas: name a folder with --out-dir DIR",
+                    self.panoramas.len()
+                )
+            }
+            (Some(output), _) => vec![output.clone()],
+            (None, None) => return Ok(Vec::new()),
+            (None, Some(folder)) => {
+                let file = |p: &PathBuf| {
+                    let stem = p.file_stem().ok_or_else(|| anyhow!("{}: is no file name", p.display()))?;
+                    let mut name = stem.to_owned();
+                    name.push(".json");
+                    Ok(folder.join(name))
+                };
+                let files = self.panoramas.iter().map(file).collect::<Result<Vec<_>>>()?;
+                if !folder.exists() {
+                    // nothing to overwrite: only names can clash
+                    output::check_distinct(&files)?;
+                    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+                }
+                files.iter().try_for_each(|f| refuse_existing(f, overwrite))?;
+                files
+            }
+        };
+        output::check(&outputs, &["json"], overwrite)?;
+        Ok(outputs)
+    }
+}
+
+fn place(sheet: &mut Sheet, row: usize, encoded: &Encoded) {
+    let grid = Equirect::new(PREVIEW[0], PREVIEW[1]);
+    let pair = [encoded.panorama.resample(grid), Panorama::new(grid, encoded.field.bake(grid))];
+    for (column, image) in pair.iter().enumerate() {
+        // what the PSNR compares: each with its own white
+        let tonemap = Tonemap::reference(image);
+        sheet.place(column, row, image.pixels().iter().map(|p| tonemap.apply_u8(*p)));
+    }
+}
+
+fn print(path: &Path, output: Option<&PathBuf>, encoded: &Encoded, report: Report) -> Result<()> {
+    let text = encoded.latent.to_json()?;
+    if report.is_json() {
+        let value = json!({
+            "panorama": path.display().to_string(),
+            "output": output.map(|o| o.display().to_string()),
+            "ldr_psnr": encoded.scores.psnr_ldr,
+            "hdr_psnr": encoded.scores.psnr_hdr,
+            "ssim": encoded.scores.ssim_ldr,
+            "latent": serde_json::from_str::<serde_json::Value>(&text)?,
+        });
+        return report.result("", &value);
+    }
+    match output {
+        Some(output) => {
+            let (n, psnr) = (encoded.latent.vectors.len(), encoded.scores.psnr_ldr);
+            let stops = encoded.latent.log_exposure / std::f32::consts::LN_2;
+            let human = format!(
+                "{}: {n} vectors, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB",
+                output.display()
+            );
+            report.result(human, &())
+        }
+        None => to_stdout(format!("{text}\n").as_bytes()),
+    }
+}

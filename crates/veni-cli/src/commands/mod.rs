@@ -1,0 +1,31 @@
+//! One command per file: its arguments, with their help, and what it does.
+
+pub(crate) mod bake;
+pub(crate) mod completions;
+#[cfg(feature = "learn")]
+pub(crate) mod encode;
+pub(crate) mod inspect;
+pub(crate) mod man;
+pub(crate) mod sample;
+#[cfg(feature = "learn")]
+pub(crate) mod train;
+
+use anyhow::Result;
+
+use crate::args::Command;
+use crate::report::{Outcome, Report};
+
+/// Runs what was typed.
+pub(crate) fn run(command: Command, report: Report) -> Result<Outcome> {
+    match command {
+        Command::Bake(c) => c.run(report),
+        Command::Sample(c) => c.run(report),
+        #[cfg(feature = "learn")]
+        Command::Encode(c) => c.run(report),
+        Command::Inspect(c) => c.run(report),
+        #[cfg(feature = "learn")]
+        Command::Train(c) => c.run(report),
+        Command::Completions(c) => c.run(report),
+        Command::Man(c) => c.run(report),
+    }
+}

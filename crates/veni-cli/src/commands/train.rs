@@ -1,0 +1,296 @@
+//! `veni-cli train`: a model from a folder of panoramas.
+
+mod config;
+mod watch;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use veni_core::Error;
+use veni_core::data::Splits;
+use veni_core::train::config::DeviceKind;
+use veni_core::train::presets::Preset;
+use veni_core::train::run::{Finish, Trainer};
+
+use crate::args::Force;
+use crate::commands::inspect::run::{self, Best};
+use crate::output::{folder_of, with_remedy, writable};
+use crate::progress::duration;
+use crate::report::{Outcome, Report, to_stderr};
+use watch::Watch;
+
+/// What a run writes into its folder.
+const FILES: [&str; 3] = ["config.toml", "metrics.jsonl", "model.safetensors"];
+const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
+
+/// Train a model on HDR panoramas
+#[derive(Args, Debug)]
+#[command(
+    long_about = "Train a model on HDR panoramas.\n\n\
+        DIR holds equirectangular OpenEXR or Radiance files. If it has the folders train/ and val/, they are used \
+        as such; otherwise a tenth of the files, chosen by seed, validates. RUN receives config.toml (everything \
+        that defines the run), metrics.jsonl (one line per step and validation), preview/*.png (target | \
+        reconstruction | random sample), checkpoint/ and model.safetensors, the weights that validated best.\n\n\
+        Ctrl-C writes a checkpoint and ends; a second one ends at once. A run that was stopped or killed continues \
+        with --resume from its last checkpoint as if nothing had happened, to the bit on the same machine.",
+    after_help = "Examples:\n  \
+        veni-cli train --data assets/panoramas --preset tiny --out runs/try\n  \
+        veni-cli train --data hdri --preset small --latent-vectors 9 --seed 1 --out runs/small\n  \
+        veni-cli train --resume --out runs/small\n  \
+        veni-cli train --data hdri --out runs/kld --set loss.kld=0.001 --set batch=8\n  \
+        veni-cli train --config runs/small/config.toml --seed 2 --out runs/second"
+)]
+pub(crate) struct Train {
+    /// Folders of panoramas (or files)
+    #[arg(long, value_name = "DIR", num_args = 1.., required_unless_present_any = ["resume", "config"])]
+    data: Vec<PathBuf>,
+
+    /// Folder of the run
+    #[arg(long, short, value_name = "RUN")]
+    out: PathBuf,
+
+    /// Starting point for all settings [default: small]
+    #[arg(long, value_enum, conflicts_with = "config")]
+    preset: Option<PresetName>,
+
+    /// Number N of latent vectors; the article's D is 3N [default: 9]
+    #[arg(long, short = 'n', value_name = "N", conflicts_with = "config")]
+    latent_vectors: Option<usize>,
+
+    /// Seed of everything random [default: the preset's]
+    #[arg(long, short, value_name = "S")]
+    seed: Option<u64>,
+
+    /// Number of updates; learning rates fall accordingly [default: the preset's]
+    #[arg(long, value_name = "N")]
+    steps: Option<u64>,
+
+    /// Settings from a file, such as another run's config.toml, instead of a preset
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+
+    /// Change one setting by its name in config.toml; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+
+    /// What computes
+    #[arg(long, value_enum)]
+    device: Option<TrainDevice>,
+
+    /// Continue the run in RUN; other settings, if given, must be its own
+    #[arg(long, conflicts_with = "force")]
+    resume: bool,
+
+    #[command(flatten)]
+    force: Force,
+}
+
+/// The presets by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PresetName {
+    /// Trains in seconds and is good for nothing but tests
+    Tiny,
+    /// As good as an hour or two on two CPU cores can buy
+    Small,
+    /// The article's sizes, for a graphics card
+    Paper,
+}
+
+impl From<PresetName> for Preset {
+    fn from(name: PresetName) -> Self {
+        match name {
+            PresetName::Tiny => Self::Tiny,
+            PresetName::Small => Self::Small,
+            PresetName::Paper => Self::Paper,
+        }
+    }
+}
+
+/// What was compiled in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TrainDevice {
+    /// The fastest one of this build: flex
+    Auto,
+    /// All CPU cores, through burn's flex backend
+    Flex,
+    /// All CPU cores, through burn's ndarray backend
+    #[cfg(feature = "ndarray")]
+    Ndarray,
+}
+
+impl From<TrainDevice> for DeviceKind {
+    fn from(device: TrainDevice) -> Self {
+        match device {
+            TrainDevice::Auto | TrainDevice::Flex => Self::Flex,
+            #[cfg(feature = "ndarray")]
+            TrainDevice::Ndarray => Self::Ndarray,
+        }
+    }
+}
+
+impl Train {
+    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        let started = Instant::now();
+        let mut trainer = if self.resume { self.continued()? } else { self.begun()? };
+        let stop = stop_on_signal()?;
+        let mut watch = Watch::new(report);
+        let finish = trainer.run(&stop, &mut watch).map_err(with_remedy)?;
+        watch.finish();
+        let (done, total) = (trainer.steps_done(), trainer.config().steps);
+        let best = run::best(&self.out)?;
+        self.report(report, finish, [done, total], best.as_ref(), started)?;
+        if finish == Finish::Complete {
+            return Ok(Outcome::Fine);
+        }
+        let out = shell_word(&self.out);
+        report.note(format_args!(
+            "stopped after step {done} of {total}; to go on: veni-cli train --resume --out {out}"
+        ));
+        Ok(Outcome::Negative)
+    }
+
+    /// A new run.
+    fn begun(&self) -> Result<Trainer> {
+        let config = self.settings()?;
+        if self.check_folder()? {
+            // what is there goes only once the new data is known to be good
+            Splits::open(&config.data, config.seed)?;
+            self.clear()?;
+        }
+        Trainer::create(&self.out, config, &self.command_line()).map_err(with_remedy)
+    }
+
+    /// A run that exists.
+    fn continued(&self) -> Result<Trainer> {
+        let stored = self.out.join("config.toml");
+        if !stored.is_file() {
+            bail!(
+                "{}: no run to continue (it has no config.toml); leave --resume out to begin one",
+                self.out.display()
+            );
+        }
+        self.check_same(&stored)?;
+        Ok(Trainer::resume(&self.out, &self.command_line())?)
+    }
+
+    /// Refuses a folder in use before the data is read. Whether there is a run to clear away (`--force`).
+    fn check_folder(&self) -> Result<bool> {
+        let out = &self.out;
+        if !out.exists() {
+            return writable(existing_above(out), out).map(|()| false);
+        }
+        if !out.is_dir() {
+            bail!("{}: is a file; name a folder for the run with --out", out.display());
+        }
+        writable(out, out)?;
+        let mut entries = std::fs::read_dir(out).map_err(|e| Error::io(out, "list", e))?.peekable();
+        if entries.peek().is_none() {
+            return Ok(false);
+        }
+        if !out.join("config.toml").is_file() {
+            bail!("{}: is not empty and no run either; name a new folder with --out", out.display());
+        }
+        if !self.force.force {
+            bail!(
+                "{}: holds a run already; --resume continues it, --force begins anew in its place",
+                out.display()
+            );
+        }
+        for entry in entries {
+            let name = entry.map_err(|e| Error::io(out, "list", e))?.file_name();
+            if !FILES.iter().chain(&FOLDERS).any(|known| name == *known) {
+                bail!(
+                    "{}: holds {} beside its run; name a new folder with --out",
+                    out.display(),
+                    name.display()
+                );
+            }
+        }
+        Ok(true)
+    }
+
+    /// Removes a run's files.
+    fn clear(&self) -> Result<()> {
+        for file in FILES {
+            remove(&self.out.join(file), |p| std::fs::remove_file(p))?;
+        }
+        for folder in FOLDERS {
+            remove(&self.out.join(folder), |p| std::fs::remove_dir_all(p))?;
+        }
+        Ok(())
+    }
+
+    fn report(
+        &self,
+        report: Report,
+        finish: Finish,
+        [done, total]: [u64; 2],
+        best: Option<&Best>,
+        started: Instant,
+    ) -> Result<()> {
+        let model = self.out.join("model.safetensors");
+        let time = duration(started.elapsed());
+        let valued = best.map_or_else(
+            || "no validation yet".to_owned(),
+            |b| format!("best validation LDR PSNR {:.2} dB at step {}", b.ldr_psnr, b.step),
+        );
+        let steps = if finish == Finish::Complete {
+            format!("{total} steps")
+        } else {
+            format!("{done} of {total} steps")
+        };
+        let human = format!("{}: {steps} ({time}), {valued}", self.out.display());
+        let value = json!({
+            "run": self.out.display().to_string(),
+            "finished": finish == Finish::Complete,
+            "steps_done": done,
+            "steps": total,
+            "best": best.map(|b| json!({ "step": b.step, "ldr_psnr": b.ldr_psnr })),
+            "model": model.is_file().then(|| model.display().to_string()),
+            "seconds": started.elapsed().as_secs_f64(),
+        });
+        report.result(human, &value)
+    }
+}
+
+/// The nearest folder above that exists.
+fn existing_above(path: &Path) -> &Path {
+    let mut folder = folder_of(path);
+    while !folder.exists() && folder != Path::new(".") {
+        folder = folder_of(folder);
+    }
+    folder
+}
+
+fn remove(path: &Path, how: impl Fn(&Path) -> std::io::Result<()>) -> Result<()> {
+    if path.exists() {
+        how(path).map_err(|e| Error::io(path, "remove", e))?;
+    }
+    Ok(())
+}
+
+/// Raised by the first Ctrl-C (or a request to terminate); the second one ends the process.
+fn stop_on_signal() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        to_stderr("stopping after this step and writing a checkpoint (again: end at once)\n");
+    })
+    .context("cannot watch for Ctrl-C")?;
+    Ok(stop)
+}
+
+/// Quoted if a shell would split it.
+fn shell_word(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/._-+,=@%".contains(c);
+    if text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', r"'\''")) }
+}

@@ -1,0 +1,110 @@
+//! From the command line to the configuration of a run.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, anyhow, bail};
+use veni_core::Error;
+use veni_core::model::Model;
+use veni_core::train::config::TrainConfig;
+use veni_core::train::presets::Preset;
+
+use super::{PresetName, Train, shell_word};
+
+impl Train {
+    /// All settings: preset or file, then the options, then `--set`.
+    pub(super) fn settings(&self) -> Result<TrainConfig> {
+        let mut config = match &self.config {
+            Some(path) => read(path)?,
+            None => Preset::from(self.preset.unwrap_or(PresetName::Small))
+                .config(self.latent_vectors.unwrap_or(9)),
+        };
+        if !self.data.is_empty() {
+            config.data.folders = self.data.clone();
+        }
+        if let Some(seed) = self.seed {
+            config.seed = seed;
+        }
+        if let Some(device) = self.device {
+            config.device = device.into();
+        }
+        if let Some(steps) = self.steps {
+            config = config.with_overrides(&[format!("steps={steps}")])?;
+        }
+        let config = config.with_overrides(&self.set).context("--set")?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// With `--resume`: whatever else was typed must be what the run was begun with.
+    pub(super) fn check_same(&self, stored: &Path) -> Result<()> {
+        let described = !self.data.is_empty() || self.config.is_some();
+        let changed = self.preset.is_some()
+            || self.latent_vectors.is_some()
+            || self.seed.is_some()
+            || self.steps.is_some()
+            || self.device.is_some()
+            || !self.set.is_empty();
+        if !described && !changed {
+            return Ok(());
+        }
+        if !described {
+            bail!(
+                "{}: a run goes on with its own settings: leave the other options out, or give --data and all that \
+                 it was begun with",
+                self.out.display()
+            );
+        }
+        let (old, new) = (read(stored)?.to_toml()?, self.settings()?.to_toml()?);
+        let differing = old.lines().zip(new.lines()).find(|(a, b)| a != b);
+        match differing {
+            Some((old, new)) => bail!(
+                "{}: the run was begun with '{old}', not '{new}'; leave the options out to go on with its own \
+                 settings, or name another --out",
+                self.out.display()
+            ),
+            None if old.lines().count() != new.lines().count() => {
+                bail!(
+                    "{}: the run was begun with other settings; leave the options out to go on",
+                    self.out.display()
+                )
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The command that repeats this run, for the model file. A model is given away: of a path only its last name
+    /// is recorded.
+    pub(super) fn command_line(&self) -> String {
+        if self.resume {
+            // what began the run, as far as it is known
+            let model = Model::load(self.out.join("model.safetensors")).ok();
+            let begun = model.and_then(|m| m.info().training.as_ref().map(|t| t.command.clone()));
+            return begun.unwrap_or_else(|| "veni-cli train --config config.toml".to_owned());
+        }
+        let last = |path: &PathBuf| shell_word(path.file_name().map_or(path, Path::new));
+        let mut words = vec!["veni-cli train".to_owned()];
+        for folder in &self.data {
+            words.push(format!("--data {}", last(folder)));
+        }
+        if let Some(config) = &self.config {
+            words.push(format!("--config {}", last(config)));
+        }
+        if let Some(preset) = self.preset {
+            words.push(format!("--preset {}", format!("{preset:?}").to_lowercase()));
+        }
+        let numbers = [
+            ("--latent-vectors", self.latent_vectors.map(|n| n as u64)),
+            ("--seed", self.seed),
+            ("--steps", self.steps),
+        ];
+        words.extend(numbers.into_iter().filter_map(|(name, n)| Some(format!("{name} {}", n?))));
+        words.extend(self.set.iter().map(|set| format!("--set {}", shell_word(Path::new(set)))));
+        words.push(format!("--out {}", last(&self.out)));
+        words.join(" ")
+    }
+}
+
+fn read(path: &Path) -> Result<TrainConfig> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+    TrainConfig::from_toml(&text).map_err(|e| anyhow!("{}", e.in_file(path)))
+}

@@ -1,0 +1,177 @@
+//! Output files: what is checked before any work, and rows written to several files at once.
+
+use std::fs::OpenOptions;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use veni_core::Error;
+use veni_core::output::{Overwrite, refuse_existing};
+use veni_core::panorama::{WriteOptions, write_rows};
+use veni_core::sphere::Equirect;
+
+/// Attribute of a baked image: the latent's JSON.
+pub(crate) const LATENT: &str = "veni:latent";
+/// Attribute: hash of the model that decoded it.
+pub(crate) const MODEL: &str = "veni:model";
+/// Attribute: which axes other software gives the directions.
+pub(crate) const FRAME: &str = "veni:frame";
+/// Attribute of a cube map: its faces from top to bottom.
+pub(crate) const CUBE_FACES: &str = "veni:cubeFaces";
+
+/// Refuses, before any work, what could not be written after it: a file that exists, a name without one of
+/// `extensions`, a folder that is missing or cannot be written to, a name given twice.
+pub(crate) fn check(paths: &[PathBuf], extensions: &[&str], overwrite: Overwrite) -> Result<()> {
+    check_distinct(paths)?;
+    for path in paths {
+        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        if !extension.as_deref().is_some_and(|e| extensions.contains(&e)) {
+            bail!("{}: the name must end in .{}", path.display(), extensions.join(" or ."));
+        }
+        if path.is_dir() {
+            bail!("{}: is a folder; name a file in it", path.display());
+        }
+        refuse_existing(path, overwrite)?;
+        writable(folder_of(path), path)?;
+    }
+    Ok(())
+}
+
+/// The folder that holds `path`.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    }
+}
+
+/// Refuses two outputs of one name.
+pub(crate) fn check_distinct(paths: &[PathBuf]) -> Result<()> {
+    match paths.iter().enumerate().find(|(at, path)| paths[..*at].contains(path)) {
+        Some((_, path)) => bail!("{}: would be written twice; leave one out or rename it", path.display()),
+        None => Ok(()),
+    }
+}
+
+/// Creates and removes an empty file: permissions alone do not say whether a file system is writable.
+pub(crate) fn writable(folder: &Path, wanted: &Path) -> Result<()> {
+    match folder.metadata() {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            bail!("{}: there is no folder {}; create it first", wanted.display(), folder.display())
+        }
+        Err(e) => return Err(Error::io(folder, "look into", e).into()),
+        Ok(meta) if !meta.is_dir() => {
+            bail!("{}: {} is a file, not a folder; name another place", wanted.display(), folder.display())
+        }
+        Ok(_) => {}
+    }
+    let probe = folder.join(format!(".veni-cli-{}.probe", std::process::id()));
+    match OpenOptions::new().write(true).create_new(true).open(&probe) {
+        Ok(_) => {
+            // an empty file that stays behind is not worth failing for
+            let _ = std::fs::remove_file(&probe);
+            Ok(())
+        }
+        Err(e) => bail!(
+            "{}: cannot create files in {} ({e}); make it writable or name another folder",
+            wanted.display(),
+            folder.display()
+        ),
+    }
+}
+
+/// Adds what to do to an error of the system while writing.
+pub(crate) fn with_remedy(error: Error) -> anyhow::Error {
+    let remedy = match &error {
+        Error::Io { action: "write", source, .. } => match source.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+                "free some space or name another disk"
+            }
+            io::ErrorKind::FileTooLarge => "bake a smaller size or raise the limit on file sizes",
+            io::ErrorKind::PermissionDenied => "make the folder writable or name another one",
+            // some encoders hide the kind
+            _ => "check free space, quota and limits, or name another disk",
+        },
+        _ => return error.into(),
+    };
+    anyhow::anyhow!("{error}; nothing was kept of this file: {remedy}")
+}
+
+/// Takes rows of linear radiance from the top down.
+pub(crate) type Push<'a> = &'a mut dyn FnMut(&[[f32; 3]]) -> veni_core::Result<()>;
+
+/// Writes one image to several files in one pass: what `produce` pushes goes to all of them.
+///
+/// Every file is complete or absent; if a later one fails, an earlier one may stay.
+pub(crate) fn write_all(
+    files: &[(PathBuf, WriteOptions)],
+    grid: Equirect,
+    produce: &mut dyn FnMut(Push<'_>) -> veni_core::Result<()>,
+) -> veni_core::Result<()> {
+    // writers put their own path before an error that passes through them; the first one said is the true one
+    let mut first = None;
+    let result = nest(files, grid, &mut |_| Ok(()), produce, &mut first);
+    first.map_or(result, Err)
+}
+
+fn nest(
+    files: &[(PathBuf, WriteOptions)],
+    grid: Equirect,
+    outer: Push<'_>,
+    produce: &mut dyn FnMut(Push<'_>) -> veni_core::Result<()>,
+    first: &mut Option<Error>,
+) -> veni_core::Result<()> {
+    let Some(((path, options), rest)) = files.split_first() else {
+        return keep(produce(outer), first);
+    };
+    let result = write_rows(path, grid, options, |sink| {
+        let mut push = |rows: &[[f32; 3]]| {
+            outer(rows)?;
+            sink.push(rows).map_err(|e| e.in_file(path))
+        };
+        nest(rest, grid, &mut push, produce, first)
+    });
+    keep(result, first)
+}
+
+/// Moves an error to `first` unless there is one, and leaves a stand-in that only says "stop".
+fn keep(result: veni_core::Result<()>, first: &mut Option<Error>) -> veni_core::Result<()> {
+    result.map_err(|error| {
+        first.get_or_insert(error);
+        Error::invalid("stopped")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use veni_core::panorama::{Panorama, Precision, WriteFormat};
+
+    fn options() -> WriteOptions {
+        WriteOptions::new(WriteFormat::Exr(Precision::Float))
+    }
+
+    #[test]
+    fn rows_go_to_every_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let files: Vec<_> = ["a.exr", "b.exr", "c.exr"].map(|n| (folder.path().join(n), options())).into();
+        let image = Panorama::from_fn(Equirect::new(8, 4), |[x, y, z]| [2.0 + x, 2.0 + y, 2.0 + z]);
+        write_all(&files, image.grid(), &mut |push| image.pixels().chunks(8).try_for_each(&mut *push))
+            .unwrap();
+        for (path, _) in &files {
+            assert_eq!(Panorama::read(path).unwrap().pixels(), image.pixels());
+        }
+    }
+
+    #[test]
+    fn a_failing_file_is_named_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let files: Vec<_> =
+            ["a.exr", "missing/b.exr", "c.exr"].map(|n| (folder.path().join(n), options())).into();
+        let row = [[1.0; 3]; 8];
+        let error = write_all(&files, Equirect::new(8, 4), &mut |push| (0..4).try_for_each(|_| push(&row)));
+        let text = error.unwrap_err().to_string();
+        assert!(text.contains("b.exr") && !text.contains("a.exr") && !text.contains("c.exr"), "{text}");
+        assert!(!files[0].0.exists());
+    }
+}

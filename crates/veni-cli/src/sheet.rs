@@ -1,0 +1,82 @@
+//! Several 8-bit pictures of one size, side by side in one PNG.
+
+use std::io::Write;
+use std::path::Path;
+
+use veni_core::output::{Overwrite, write_atomic};
+use veni_core::{Error, Result};
+
+/// Pixels between pictures.
+const GAP: usize = 4;
+/// The colour between them, and of cells that stay empty.
+const BACKGROUND: [u8; 3] = [24; 3];
+
+/// A grid of cells, sRGB, row-major.
+pub(crate) struct Sheet {
+    cell: [usize; 2],
+    width: usize,
+    height: usize,
+    pixels: Vec<[u8; 3]>,
+}
+
+impl Sheet {
+    /// `columns` x `rows` empty cells of `width` x `height` pixels.
+    pub(crate) fn new(columns: usize, rows: usize, width: usize, height: usize) -> Self {
+        let side = |cells: usize, size: usize| cells * (size + GAP) + GAP;
+        let cell = [width, height];
+        let (width, height) = (side(columns, width), side(rows, height));
+        Self { cell, width, height, pixels: vec![BACKGROUND; width * height] }
+    }
+
+    /// Fills the cell in `column` of `row` with its pixels, row-major.
+    pub(crate) fn place(&mut self, column: usize, row: usize, pixels: impl IntoIterator<Item = [u8; 3]>) {
+        let [width, height] = self.cell;
+        let (left, top) = (column * (width + GAP) + GAP, row * (height + GAP) + GAP);
+        for (at, pixel) in pixels.into_iter().take(width * height).enumerate() {
+            self.pixels[(top + at / width) * self.width + left + at % width] = pixel;
+        }
+    }
+
+    /// Writes the PNG.
+    pub(crate) fn write(&self, path: &Path, overwrite: Overwrite) -> Result<()> {
+        let broken = |e: png::EncodingError| match e {
+            png::EncodingError::IoError(e) => Error::io(path, "write", e),
+            other => Error::invalid(format!("{}: PNG: {other}", path.display())),
+        };
+        // sides are bounded by what the commands accept
+        let (width, height) = (self.width as u32, self.height as u32);
+        write_atomic(path, overwrite, |file| {
+            let mut encoder = png::Encoder::new(&mut *file, width, height);
+            encoder.set_color(png::ColorType::Rgb);
+            encoder.set_depth(png::BitDepth::Eight);
+            encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+            let mut writer = encoder.write_header().map_err(broken)?;
+            writer.write_image_data(self.pixels.as_flattened()).map_err(broken)?;
+            writer.finish().map_err(broken)?;
+            file.flush().map_err(|e| Error::io(path, "write", e))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_do_not_touch_and_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sheet.png");
+        let mut sheet = Sheet::new(2, 3, 5, 4);
+        sheet.place(1, 2, [[200, 100, 50]; 20]);
+        sheet.place(0, 0, (0..20).map(|k| [k, 0, 0]));
+        sheet.write(&path, Overwrite::Refuse).unwrap();
+        assert!(sheet.write(&path, Overwrite::Refuse).is_err());
+        let image = image::open(&path).unwrap().to_rgb8();
+        assert_eq!(image.dimensions(), (2 * 5 + 3 * 4, 3 * 4 + 4 * 4));
+        assert_eq!(image.get_pixel(4 + 2, 4 + 1).0, [7, 0, 0]);
+        assert_eq!(image.get_pixel(13, 20).0, [200, 100, 50]);
+        assert_eq!(image.get_pixel(12, 20).0, BACKGROUND);
+        let painted = image.pixels().filter(|p| p.0 != BACKGROUND).count();
+        assert_eq!(painted, 40);
+    }
+}

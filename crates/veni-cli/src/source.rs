@@ -1,0 +1,133 @@
+//! Where a model and a latent come from: whatever a user may name for them.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, anyhow, bail};
+use veni_core::latent::Latent;
+use veni_core::model::Model;
+use veni_core::{Error, panorama};
+
+use crate::args::ModelArgs;
+use crate::output::{CUBE_FACES, LATENT};
+use crate::report::Report;
+
+/// A model and what to call it in messages.
+pub(crate) struct Loaded {
+    pub(crate) model: Model,
+    pub(crate) name: String,
+}
+
+/// The model of `--model`: a file, the folder of a training run, or the one inside the program.
+pub(crate) fn model(args: &ModelArgs) -> Result<Loaded> {
+    let Some(path) = &args.model else {
+        return Ok(Loaded { model: embedded()?, name: "the model inside this program".into() });
+    };
+    let path = model_file(path)?;
+    Ok(Loaded { model: Model::load(&path)?, name: path.display().to_string() })
+}
+
+#[cfg(feature = "pretrained")]
+#[expect(clippy::unnecessary_wraps, reason = "without the feature it fails")]
+fn embedded() -> Result<Model> {
+    Ok(Model::pretrained())
+}
+
+#[cfg(not(feature = "pretrained"))]
+fn embedded() -> Result<Model> {
+    bail!("this build has no model inside: name a model file with --model FILE")
+}
+
+fn model_file(path: &Path) -> Result<PathBuf> {
+    if !path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let inside = path.join("model.safetensors");
+    if !inside.is_file() {
+        bail!("{}: a folder without model.safetensors; name a model file or a finished run", path.display());
+    }
+    Ok(inside)
+}
+
+/// The latent that `--seed` names: drawn from the model's prior.
+pub(crate) fn seeded(model: &Model, seed: u64) -> Latent {
+    Latent { model: Some(model.hash()), ..Latent::from_seed(&model.prior(), seed) }
+}
+
+/// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder.
+pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
+    let model = &loaded.model;
+    let mut latent = match content(path)? {
+        Content::Latent => Latent::load(path)?,
+        Content::Image => {
+            let attributes = panorama::attributes(path)?;
+            match attributes.get(LATENT) {
+                Some(text) => Latent::from_json(text)
+                    .map_err(|e| anyhow!("{}: attribute {LATENT}: {e}", path.display()))?,
+                None if attributes.contains_key(CUBE_FACES) => {
+                    bail!(
+                        "{}: a cube map cannot be encoded; name an equirectangular panorama",
+                        path.display()
+                    )
+                }
+                None => encode(path, loaded, report)?,
+            }
+        }
+    };
+    check(&latent, model).with_context(|| path.display().to_string())?;
+    if latent.model.is_none() {
+        report.note(format_args!(
+            "{}: does not say which model it belongs to; taken for this one",
+            path.display()
+        ));
+        latent.model = Some(model.hash());
+    }
+    Ok(latent)
+}
+
+/// A latent means something only to the decoder that it was made for.
+fn check(latent: &Latent, model: &Model) -> Result<()> {
+    let (n, expected) = (latent.vectors.len(), model.latent_vectors());
+    if n != expected {
+        bail!(
+            "a latent of {n} vectors, but this model has {expected}: name the latent's own model with --model FILE"
+        );
+    }
+    match &latent.model {
+        Some(hash) if *hash != model.hash() => bail!(
+            "a latent of model {hash}, but this is model {}: name the latent's own model with --model FILE",
+            model.hash()
+        ),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(feature = "learn")]
+fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
+    report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
+    crate::commands::encode::Encoding::new(loaded)?.encode_file(path, report).map(|e| e.latent)
+}
+
+#[cfg(not(feature = "learn"))]
+fn encode(path: &Path, _: &Loaded, _: Report) -> Result<Latent> {
+    bail!(
+        "{}: no latent inside, and this build cannot encode panoramas (it lacks the feature `learn`)",
+        path.display()
+    )
+}
+
+enum Content {
+    Latent,
+    Image,
+}
+
+/// JSON is a latent; everything else is left to the image readers, which say what they do not read.
+fn content(path: &Path) -> Result<Content> {
+    let mut start = Vec::new();
+    let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+    file.take(64).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
+    let json = start.trim_ascii_start().starts_with(b"{");
+    let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    Ok(if json || named { Content::Latent } else { Content::Image })
+}

@@ -1,0 +1,99 @@
+//! Scores a model on a folder of panoramas and draws what it does:
+//! `cargo run --release -p veni-core --example reconstruction -- MODEL FOLDER [OVERVIEW.png]`.
+//!
+//! Prints Markdown: per panorama and in the mean, the autoencoder pass and a latent optimised for each panorama.
+
+#![allow(clippy::print_stdout, reason = "a program for a terminal")]
+
+use std::path::Path;
+
+use burn::tensor::Device;
+use image::{Rgb, RgbImage};
+use veni_core::data::{Dataset, Item, panorama_files};
+use veni_core::eval::metrics::Alignment;
+use veni_core::eval::reconstruction::{Reconstruction, Start};
+use veni_core::fit::FitConfig;
+use veni_core::latent::Latent;
+use veni_core::model::Model;
+use veni_core::output::{Overwrite, write_atomic};
+use veni_core::panorama::Panorama;
+use veni_core::panorama::tonemap::Tonemap;
+use veni_core::sphere::Equirect;
+use veni_core::vae::Veni;
+use veni_core::{Error, Result};
+
+fn main() -> Result<()> {
+    let arguments: Vec<_> = std::env::args().skip(1).collect();
+    let (model, folder, overview) = match arguments.as_slice() {
+        [model, folder] => (model, folder, None),
+        [model, folder, overview] => (model, folder, Some(Path::new(overview))),
+        _ => return Err(Error::invalid("usage: reconstruction MODEL FOLDER [OVERVIEW.png]")),
+    };
+    let model = Model::load(Path::new(model))?;
+    let veni = Veni::from_model(&model, &Device::flex())?;
+    let set = Dataset::load(&panorama_files(Path::new(folder))?, Equirect::new(128, 64))?;
+
+    let pass = Reconstruction::autoencoder(&veni, &set, Alignment::Exposure)?;
+    // a fit needs gradients in the latent
+    let tracked = Veni::from_model(&model, &Device::flex().autodiff())?;
+    let best = Reconstruction::optimised(&tracked, &set, Start::Encoder, &FitConfig::thorough(), Alignment::Exposure)?;
+    println!("| panorama | LDR PSNR | HDR PSNR | SSIM | optimised LDR PSNR | HDR PSNR | SSIM |");
+    println!("|---|---|---|---|---|---|---|");
+    let row = |name: &str, a: &[f64; 3], b: &[f64; 3]| {
+        println!("| {name} | {:.2} | {:.2} | {:.3} | {:.2} | {:.2} | {:.3} |", a[0], a[1], a[2], b[0], b[1], b[2]);
+    };
+    for ((name, a), (_, b)) in pass.images.iter().zip(&best.images) {
+        row(name, &[a.ldr_psnr, a.hdr_psnr, a.ssim], &[b.ldr_psnr, b.hdr_psnr, b.ssim]);
+    }
+    let (a, b) = (pass.mean, best.mean);
+    row("**mean**", &[a.ldr_psnr, a.hdr_psnr, a.ssim], &[b.ldr_psnr, b.hdr_psnr, b.ssim]);
+
+    let reference = reference_protocol(&veni, &set)?;
+    println!(
+        "\nThe autoencoder pass with the reference's factor on log radiance: LDR PSNR {:.2}, HDR PSNR {:.2}, SSIM {:.3}.",
+        reference.mean.ldr_psnr, reference.mean.hdr_psnr, reference.mean.ssim
+    );
+    overview.map_or(Ok(()), |path| draw(path, &model, &veni, &set))
+}
+
+/// The authors' protocol: their factor on log radiance as stored in the files, exposure included.
+fn reference_protocol(veni: &Veni, set: &Dataset) -> Result<Reconstruction> {
+    let images: Vec<_> = set.items().iter().map(|item| item.log_radiance.as_slice()).collect();
+    let latents: Vec<_> = veni.encode(set.grid(), &images)?.into_iter().map(|e| e.vectors).collect();
+    let mut decoded = veni.decode(set.grid(), &latents);
+    let items = set.items().iter().zip(&mut decoded).map(|(item, decoded)| {
+        decoded.iter_mut().for_each(|v| *v += item.log_exposure);
+        let log_radiance = item.log_radiance.iter().map(|v| v + item.log_exposure).collect();
+        Item { log_radiance, ..item.clone() }
+    });
+    let exposed = Dataset::new(set.grid(), items.collect());
+    Ok(Reconstruction::compare(&exposed, &decoded, Alignment::LogFactor))
+}
+
+/// Target | reconstruction | random sky, a row per panorama.
+fn draw(path: &Path, model: &Model, veni: &Veni, set: &Dataset) -> Result<()> {
+    const GAP: u32 = 4;
+    let grid = Equirect::new(256, 128);
+    let (w, h) = (grid.width as u32, grid.height as u32);
+    let mut sheet = RgbImage::from_pixel(3 * w + 2 * GAP, set.len() as u32 * (h + GAP) - GAP, Rgb([255; 3]));
+    let (decoder, prior) = (model.decoder(), model.prior());
+    let images: Vec<_> = set.items().iter().map(|item| item.log_radiance.as_slice()).collect();
+    let latents = veni.encode(set.grid(), &images)?.into_iter().map(|e| Latent::new(e.vectors));
+    for (r, (item, latent)) in (0..).zip(set.items().iter().zip(latents)) {
+        let mut target = Panorama::read(&item.path)?;
+        target.sanitise()?;
+        let random = Latent::from_seed(&prior, u64::from(r));
+        let [reconstruction, random] =
+            [latent, random].map(|z| decoder.condition(&z).map(|field| Panorama::new(grid, field.bake(grid))));
+        for (c, panorama) in (0..).zip([target.resample(grid), reconstruction?, random?]) {
+            let tonemap = Tonemap::reference(&panorama);
+            for (p, pixel) in (0..).zip(panorama.pixels()) {
+                sheet.put_pixel(c * (w + GAP) + p % w, r * (h + GAP) + p / w, Rgb(tonemap.apply_u8(*pixel)));
+            }
+        }
+    }
+    write_atomic(path, Overwrite::Replace, |out| {
+        let written = sheet.write_to(out, image::ImageFormat::Png);
+        written.map_err(|e| Error::invalid(format!("{}: {e}", path.display())))
+    })
+}

@@ -1,0 +1,10 @@
+//! Whole-system tests: the real binary, in a fresh folder each time, on real panoramas.
+#![cfg(feature = "learn")]
+
+mod bad_input;
+mod bake;
+mod encode;
+mod inspect;
+mod readers;
+mod training;
+mod util;
