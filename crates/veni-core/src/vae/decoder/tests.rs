@@ -15,9 +15,9 @@ fn decoder(form: VnReluForm, device: &Device) -> Decoder {
     Decoder::new(&config, N, &mut ChaCha8Rng::seed_from_u64(7), device)
 }
 
-/// Latents of two images.
+/// Latents of two images, at which no ReLU of the test network is within a finite difference of its kink.
 fn latent(device: &Device) -> Tensor<3> {
-    let values: Vec<f32> = (0..2 * N * 3).map(|i| (1.3 * i as f32 + 0.4).sin() * 1.5).collect();
+    let values: Vec<f32> = (0..2 * N * 3).map(|i| (1.3 * i as f32 + 0.9).sin() * 1.5).collect();
     Tensor::from_data(TensorData::new(values, [2, N, 3]), device)
 }
 
@@ -123,8 +123,8 @@ fn latent_gradients_agree_with_finite_differences() {
                 probe(decoder.forward(z, directions(&device))).into_scalar::<f32>()
             };
             let found = (at(step) - at(-step)) / (2.0 * step);
-            // Curvature (the encoding turns fast), ReLU kinks and f32 rounding leave about a percent.
-            assert!((found - gradient[i]).abs() < 2e-2 * scale, "{form:?} {i}: {found} {}", gradient[i]);
+            // What the curvature of the fast encoding and the rounding of the difference leave.
+            assert!((found - gradient[i]).abs() < 1e-2 * scale, "{form:?} {i}: {found} {}", gradient[i]);
         }
     }
 }
