@@ -1,26 +1,94 @@
-//! profile
+//! Where the time of a training step goes.
+//!
+//! `cargo run --release -p veni-core --example profile_step -- DATA [small|tiny|paper] [key=value …]`
+
+#![allow(clippy::print_stdout, reason = "a program for a terminal")]
+
+use std::path::PathBuf;
 use std::time::Instant;
-use veni_core::data::*; use veni_core::train::{batch::*,presets::*,optimiser::*,loss::Loss,step::*}; use veni_core::vae::Veni;
-use rand::SeedableRng;
+
+use burn::tensor::Tensor;
+use veni_core::data::Splits;
+use veni_core::data::random::{Purpose, stream};
+use veni_core::train::batch::Batches;
+use veni_core::train::loss::Loss;
+use veni_core::train::optimiser::{Group, Optimiser};
+use veni_core::train::presets::Preset;
+use veni_core::train::step::{batch_loss, encode, tensor};
+use veni_core::vae::Veni;
+use veni_core::{Error, Result};
+
+/// As the training example.
 #[global_allocator]
-static A: mimalloc::MiMalloc = mimalloc::MiMalloc;
-fn main(){
-    let mut a=std::env::args().skip(1); let data=a.next().unwrap(); let sets:Vec<String>=a.collect();
-    let mut c=Preset::Small.config(9).with_overrides(&sets).unwrap(); c.data.folders=vec![data.into()]; c.check().unwrap();
-    let t=Instant::now(); let s=Splits::open(&c.data,0).unwrap(); println!("load {} + {} in {:?}",s.train.len(),s.val.len(),t.elapsed());
-    let dev=c.device.device().unwrap().autodiff();
-    
-    let mut veni=Veni::new(&c.model,&mut rand_chacha::ChaCha8Rng::seed_from_u64(0),&dev).unwrap();
-    let g=|p:&str|Group{prefix:p.into(),adam:c.decoder.adam};
-    let mut opt=Optimiser::new(&veni,vec![g("decoder"),g("encoder")],0.999).unwrap();
-    let k=c.loss_grid.factor(); let loss=Loss::new(&c.loss,64/k,128/k,&dev); let b=Batches::new(&c,veni.stripes().unwrap(),&s.train);
-    let mut sum=[0.0;4]; let n:u64=std::env::var("N").map_or(6,|v|v.parse().unwrap());
-    for step in 1..=n { let t=Instant::now(); let batch=b.prepare(step); let t0=t.elapsed().as_secs_f64();
-        let t=Instant::now(); let l=batch_loss(&veni,&batch,&loss,&dev); let total=l.terms.total(); let t1=t.elapsed().as_secs_f64();
-        let t=Instant::now(); let gr=total.backward(); let t2=t.elapsed().as_secs_f64();
-        let t=Instant::now(); let lr=[c.decoder.learning_rate.at(step),c.encoder.learning_rate.at(step)]; let r; (veni,r)=opt.step(veni,&gr,&lr); let t3=t.elapsed().as_secs_f64();
-        if step>1 {for (s,t) in sum.iter_mut().zip([t0,t1,t2,t3]) {*s+=t/(n-1) as f64;}}
-        let tot:f32=total.into_scalar(); if step<6||step%20==0 {println!("{step} loss {tot:.4} norms {:.3} {:.3}",r[0].gradient_norm,r[1].gradient_norm);}
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+/// Steps that are measured, after one that is not.
+const STEPS: u64 = 10;
+
+/// Mean seconds of each part, in the order they first ran.
+#[derive(Default)]
+struct Clock(Vec<(&'static str, f64)>);
+
+impl Clock {
+    fn time<T>(&mut self, part: &'static str, counts: bool, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        let seconds = if counts { start.elapsed().as_secs_f64() / STEPS as f64 } else { 0.0 };
+        match self.0.iter_mut().find(|(name, _)| *name == part) {
+            Some((_, sum)) => *sum += seconds,
+            None => self.0.push((part, seconds)),
+        }
+        result
     }
-    println!("prepare {:.1} forward {:.1} backward {:.1} adam {:.1} ms",sum[0]*1e3,sum[1]*1e3,sum[2]*1e3,sum[3]*1e3);
+}
+
+fn main() -> Result<()> {
+    let arguments: Vec<_> = std::env::args().skip(1).collect();
+    let [data, rest @ ..] = arguments.as_slice() else {
+        return Err(Error::invalid("usage: profile_step DATA [PRESET] [key=value …]"));
+    };
+    let (preset, overrides) = match rest {
+        [first, tail @ ..] if !first.contains('=') => (first.parse()?, tail),
+        all => (Preset::Small, all),
+    };
+    let mut config = preset.config(9).with_overrides(overrides)?;
+    config.data.folders = vec![PathBuf::from(data)];
+    config.check()?;
+    let splits = Splits::open(&config.data, config.seed)?;
+    let device = config.device.device()?.autodiff();
+    let mut veni = Veni::new(&config.model, &mut stream(0, Purpose::Weights, 0, 0), &device)?;
+    let groups = [("decoder", &config.decoder), ("encoder", &config.encoder)];
+    let groups = groups.map(|(prefix, g)| Group { prefix: prefix.into(), adam: g.adam });
+    let mut optimiser = Optimiser::new(&veni, groups.into(), config.ema_decay)?;
+    let batches = Batches::new(&config, veni.stripes()?, &splits.train);
+    let [height, width] = [config.data.height, config.data.width].map(|n| n / config.loss_grid.factor());
+    let loss = Loss::new(&config.loss, height, width, &device);
+
+    let mut clock = Clock::default();
+    for step in 1..=1 + STEPS {
+        let counts = step > 1;
+        let batch = clock.time("data (on another thread in a run)", counts, || batches.prepare(step));
+        let total = clock.time("whole step: forward", counts, || batch_loss(&veni, &batch, &loss, &device).terms.total());
+        let gradients = clock.time("whole step: backward", counts, || total.backward());
+        let rates = [&config.decoder, &config.encoder].map(|g| g.learning_rate.at(step));
+        (veni, _) = clock.time("whole step: Adam, clipping, average", counts, || optimiser.step(veni, &gradients, &rates));
+
+        // the parts again, each on a graph of its own
+        let posterior = clock.time("encoder alone: forward", counts, || encode(&veni, &batch, &device));
+        clock.time("encoder alone: backward", counts, || posterior.mean.sum().backward());
+        let [rows, columns] = batch.loss_size;
+        let shape = [batch.images, rows, columns, 3];
+        let latent = tensor::<3>(&batch.noise, [batch.images, veni.latent_vectors(), 3], &device).require_grad();
+        let directions = tensor(&batch.loss_directions, [rows * columns, 3], &device);
+        let decoded = clock.time("decoder alone: forward", counts, || veni.decoder.forward(latent, directions));
+        let image: Tensor<4> = decoded.clone().detach().reshape(shape).require_grad();
+        clock.time("decoder alone: backward", counts, || decoded.sum().backward());
+        let target = tensor(&batch.target, shape, &device);
+        let value = clock.time("losses alone: forward", counts, || loss.terms(step, image, target, None).total());
+        clock.time("losses alone: backward", counts, || value.backward());
+    }
+    for (part, seconds) in clock.0 {
+        println!("{part:36} {:8.1} ms", 1e3 * seconds);
+    }
+    Ok(())
 }

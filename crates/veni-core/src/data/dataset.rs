@@ -186,3 +186,71 @@ fn read_item(path: &Path, grid: Equirect) -> Result<Item> {
     panorama.sanitise().map_err(|e| e.in_file(path))?;
     Ok(Item::new(path, &panorama, grid))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::panorama::{Precision, WriteFormat, WriteOptions};
+
+    fn folder(names: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for (i, name) in (0_u8..).zip(names) {
+            let path = folder.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            let sky = Panorama::from_fn(Equirect::new(16, 8), |d| [0.1 + f32::from(i), 1.5 + d[0], 2.0 + d[2]]);
+            sky.write(&path, &WriteOptions::new(WriteFormat::Exr(Precision::Float))).unwrap();
+        }
+        folder
+    }
+
+    fn config(folder: &Path) -> DataConfig {
+        DataConfig { folders: vec![folder.to_path_buf()], width: 8, height: 4, val_share: 0.25 }
+    }
+
+    fn names(set: &Dataset) -> Vec<String> {
+        set.items().iter().map(Item::name).collect()
+    }
+
+    #[test]
+    fn folders_named_train_and_val_decide() {
+        let folder = folder(&["train/b.exr", "train/a.exr", "val/c.exr", "train/deeper/d.exr"]);
+        let splits = Splits::open(&config(folder.path()), 0).unwrap();
+        assert_eq!((names(&splits.train), names(&splits.val)), (vec!["a".into(), "b".into()], vec!["c".into()]));
+    }
+
+    #[test]
+    fn a_seed_splits_one_folder_without_loss() {
+        let folder = folder(&["a.exr", "b.exr", "c.exr", "d.exr", "e.exr", "f.exr", "g.exr", "h.exr"]);
+        let split = |seed| Splits::open(&config(folder.path()), seed).unwrap();
+        let first = split(1);
+        assert_eq!((first.train.len(), first.val.len()), (6, 2));
+        assert_eq!(first, split(1));
+        let mut all = [names(&first.train), names(&first.val)].concat();
+        all.sort();
+        assert_eq!(all.concat(), "abcdefgh");
+        assert!((2..20).any(|seed| names(&split(seed).val) != names(&first.val)));
+    }
+
+    #[test]
+    fn items_are_at_exposure_zero_and_remember_their_own() {
+        let folder = folder(&["train/a.exr"]);
+        let set = Splits::open(&config(folder.path()), 0).unwrap().train;
+        let item = &set.items()[0];
+        assert!(crate::data::exposure::log_exposure(set.grid(), &item.log_radiance).abs() < 1e-5);
+        // a mean luminance of about 0.2126·0.1 + 0.7152·1.5 + 0.0722·2
+        assert!((item.log_exposure.exp() - 1.24).abs() < 0.15, "{}", item.log_exposure.exp());
+    }
+
+    #[test]
+    fn errors_name_the_file_or_folder() {
+        let folder = folder(&["train/a.exr"]);
+        let bad = folder.path().join("train/broken.exr");
+        fs::write(&bad, b"no panorama").unwrap();
+        let message = Splits::open(&config(folder.path()), 0).unwrap_err().to_string();
+        assert!(message.contains("broken.exr"), "{message}");
+        let empty = tempfile::tempdir().unwrap();
+        let message = Splits::open(&config(empty.path()), 0).unwrap_err().to_string();
+        assert!(message.contains(&empty.path().display().to_string()), "{message}");
+        assert!(Splits::open(&DataConfig::default(), 0).unwrap_err().to_string().contains("at least one folder"));
+    }
+}

@@ -4,6 +4,7 @@
 //! exposure 0; what was subtracted is kept beside it.
 
 pub mod augment;
+pub mod coarsen;
 mod dataset;
 pub mod exposure;
 pub mod random;

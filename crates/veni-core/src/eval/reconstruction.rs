@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::Result;
 use crate::data::Dataset;
+use crate::data::coarsen::{averaged, coarse_grid};
 use crate::eval::metrics::{self, Alignment};
 use crate::fit::{FitConfig, FitTarget, fit};
 use crate::latent::Latent;
@@ -72,26 +73,33 @@ impl Reconstruction {
         Ok(Self::of_latents(veni, dataset, &latents, alignment))
     }
 
-    /// The best the decoder can do: each panorama decoded from a latent optimised for it.
+    /// The best the decoder can do: each panorama decoded from a latent optimised for it. The fit sees the
+    /// panoramas averaged over `factor` × `factor` pixels (1: every pixel); the scores see every pixel.
     ///
     /// # Errors
     /// As [`Veni::stripes`] and [`fit`].
+    ///
+    /// # Panics
+    /// If `factor` does not divide the grid's sides.
     pub fn optimised(
         veni: &Veni,
         dataset: &Dataset,
         start: Start,
         config: &FitConfig,
+        factor: usize,
         alignment: Alignment,
     ) -> Result<Self> {
         let start = match start {
             Start::Encoder => encoded(veni, dataset)?,
             Start::Zero => vec![Latent::new(vec![[0.0; 3]; veni.latent_vectors()]); dataset.len()],
         };
-        let images: Vec<_> = dataset.items().iter().map(|item| item.log_radiance.as_slice()).collect();
-        let mut latents = Vec::with_capacity(images.len());
+        let grid = coarse_grid(dataset.grid(), factor);
+        let mut latents = Vec::with_capacity(dataset.len());
         // a few at a time: the graph of a fit holds every activation of its images
-        for (images, start) in images.chunks(4).zip(start.chunks(4)) {
-            let target = FitTarget { grid: dataset.grid(), images, masks: None };
+        for (items, start) in dataset.items().chunks(4).zip(start.chunks(4)) {
+            let images: Vec<_> = items.iter().map(|i| averaged(dataset.grid(), &i.log_radiance, factor)).collect();
+            let images: Vec<_> = images.iter().map(Vec::as_slice).collect();
+            let target = FitTarget { grid, images: &images, masks: None };
             latents.extend(fit(&veni.decoder, &target, start, config)?.latents);
         }
         Ok(Self::of_latents(veni, dataset, &latents, alignment))

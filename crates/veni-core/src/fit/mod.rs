@@ -286,7 +286,7 @@ mod tests {
         let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
         let target = FitTarget { grid, images: &views, masks: None };
         let config = FitConfig { prior: 0.0, ..FitConfig::thorough() };
-        let moved = |seed| Latent::new(latent(seed).vectors.into_iter().map(|v| v.map(|c| c + 0.3)).collect());
+        let moved = |seed| Latent::new(latent(seed).vectors.into_iter().map(|v| v.map(|c| c + 0.03)).collect());
         let start = [1, 2].map(moved);
         let result = fit(&decoder, &target, &start, &config).unwrap();
         let (first, last) = (result.losses[0], *result.losses.last().unwrap());

@@ -1,5 +1,6 @@
 //! What one step works on, prepared on the host while the previous step computes.
 
+use crate::data::coarsen::averaged;
 use crate::data::random::{Purpose, below, normal, permutation, stream, uniform};
 use crate::data::{AugmentConfig, Dataset};
 use crate::sphere::{Equirect, Stripes};
@@ -154,22 +155,7 @@ impl LossView {
                     }
                 }
             }
-            LossGrid::Averaged { factor } => {
-                for j in 0..rows {
-                    let weights: Vec<f64> = (0..factor).map(|k| self.grid.solid_angle(j * factor + k)).collect();
-                    let total: f64 = weights.iter().sum::<f64>() * factor as f64;
-                    for i in 0..columns {
-                        for c in 0..3 {
-                            let mut sum = 0.0;
-                            for (k, weight) in weights.iter().enumerate() {
-                                let row = (j * factor + k) * width + i * factor;
-                                sum += weight * (0..factor).map(|l| f64::from(image[3 * (row + l) + c])).sum::<f64>();
-                            }
-                            target.push((sum / total) as f32);
-                        }
-                    }
-                }
-            }
+            LossGrid::Averaged { factor } => target.extend(averaged(self.grid, image, factor)),
         }
     }
 }
@@ -205,17 +191,5 @@ mod tests {
             }
         }
         assert_eq!(seen.len(), GRID.len(), "every pixel has its turn");
-    }
-
-    #[test]
-    fn averages_are_by_solid_angle() {
-        let mut target = Vec::new();
-        view(LossGrid::Averaged { factor: 2 }, 0).extend_target(&ramp(), &mut target);
-        let (top, below) = (GRID.solid_angle(0), GRID.solid_angle(1));
-        let expected = (top * 0.5 + below * 8.5) / (top + below);
-        assert!((f64::from(target[0]) - expected).abs() < 1e-6);
-        let mut constant = Vec::new();
-        view(LossGrid::Averaged { factor: 4 }, 0).extend_target(&[2.5; 96], &mut constant);
-        assert_eq!(constant, [2.5; 6]);
     }
 }

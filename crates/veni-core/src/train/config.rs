@@ -95,7 +95,8 @@ pub enum LossGrid {
         factor: usize,
     },
     /// Every `factor`-th pixel of every `factor`-th row, from an offset drawn anew in each step: exact pixel
-    /// values, and every pixel in its turn.
+    /// values, and every pixel in its turn. (Rows are weighted as if each were in the middle of its
+    /// neighbours; over the offsets that evens out.)
     Strided {
         /// Distance of neighbours in pixels; must divide width and height.
         factor: usize,
@@ -264,5 +265,50 @@ fn set(table: &mut toml::Table, path: &str, value: toml::Value) -> Result<(), St
             Some(_) => Err(format!("`{first}` holds no further keys")),
             None => Err(format!("there is no `{first}`")),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::presets::Preset;
+
+    #[test]
+    fn presets_survive_their_file() {
+        for preset in [Preset::Tiny, Preset::Small, Preset::Paper] {
+            let config = preset.config(9);
+            config.check().unwrap();
+            assert_eq!(TrainConfig::from_toml(&config.to_toml().unwrap()).unwrap(), config);
+        }
+    }
+
+    #[test]
+    fn overrides_reach_every_level_and_keep_types() {
+        let config = Preset::Small.config(9);
+        let changed = config
+            .with_overrides(&["steps=500", "loss.kld=1", "model.encoder.depth=2", "device=ndarray", "order = shuffle"])
+            .unwrap();
+        assert_eq!(changed.steps, 500);
+        assert_eq!(changed.loss.kld, crate::train::schedule::WeightSchedule::Constant(1.0));
+        assert_eq!(changed.model.encoder.as_ref().unwrap().depth, 2);
+        assert_eq!((changed.device, changed.order), (DeviceKind::Ndarray, Order::Shuffle));
+        assert_eq!(changed.decoder.learning_rate.at(500), config.decoder.learning_rate.at(config.steps));
+        let grid = config.with_overrides(&[r#"loss_grid={kind="averaged", factor=4}"#]).unwrap();
+        assert_eq!(grid.loss_grid, LossGrid::Averaged { factor: 4 });
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let config = Preset::Small.config(9);
+        let refused = |text: &str| config.with_overrides(&[text]).unwrap_err().to_string();
+        assert!(refused("stepz=5").contains("stepz"));
+        assert!(refused("loss.nothing.deeper=5").contains("nothing"));
+        assert!(refused("steps").contains("no `=`"));
+        assert!(refused("steps=many").contains("steps=many"));
+        let checked = |text: &str| config.with_overrides(&[text]).unwrap().check().unwrap_err().to_string();
+        assert!(checked("loss_grid.factor=3").contains("loss_grid.factor = 3"));
+        assert!(checked("batch=0").contains("batch = 0"));
+        assert!(checked("ema_decay=1.0").contains("ema_decay = 1"));
+        assert!(checked("augment.mix=2.0").contains("augment.mix = 2"));
     }
 }

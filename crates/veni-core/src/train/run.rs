@@ -360,3 +360,7 @@ struct Record<'a> {
     step: u64,
     validation: &'a ValidationReport,
 }
+
+#[cfg(test)]
+#[path = "run_tests.rs"]
+mod tests;

@@ -37,7 +37,11 @@ pub fn batch_loss(veni: &Veni, batch: &Batch, loss: &Loss, device: &Device) -> B
     BatchLoss { terms, posterior, prediction }
 }
 
-fn encode(veni: &Veni, batch: &Batch, device: &Device) -> Posterior {
+/// The posterior of each panorama of a batch.
+///
+/// # Panics
+/// If the batch was made for another configuration.
+pub fn encode(veni: &Veni, batch: &Batch, device: &Device) -> Posterior {
     let config = &veni.encoder.config;
     let samples = batch.stripe_samples.len() / (3 * config.stripes * batch.images);
     let shape = [batch.images, config.stripes, samples, 3];

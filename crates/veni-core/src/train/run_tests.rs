@@ -1,0 +1,178 @@
+//! Whole runs of the tiny preset on synthetic skies.
+
+use super::*;
+use crate::panorama::{Panorama, Precision, WriteFormat, WriteOptions};
+use crate::sphere::Equirect;
+use crate::train::presets::Preset;
+use crate::train::schedule::WeightSchedule;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// A sky with a sun at `azimuth` over dark ground.
+fn sky(azimuth: f32) -> Panorama {
+    let sun = [azimuth.cos() * 0.8, azimuth.sin() * 0.8, 0.6];
+    Panorama::from_fn(Equirect::new(32, 16), |d| {
+        let toward = d.iter().zip(sun).map(|(a, b)| a * b).sum::<f32>();
+        let base = if d[2] > 0.0 { [0.4, 0.6, 1.0] } else { [0.12, 0.1, 0.08] };
+        base.map(|v| v + 20.0 * (12.0 * (toward - 1.0)).exp())
+    })
+}
+
+/// A folder with `train/` (two skies) and `val/` (one), and a short run on it.
+fn setup(steps: u64) -> (tempfile::TempDir, TrainConfig) {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, azimuth) in [("train/a", 0.3), ("train/b", 2.0), ("val/c", 4.0)] {
+        let path = folder.path().join("data").join(name).with_extension("exr");
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        sky(azimuth).write(&path, &WriteOptions::new(WriteFormat::Exr(Precision::Float))).unwrap();
+    }
+    let mut config = Preset::Tiny.config(3).with_overrides(&[format!("steps={steps}")]).unwrap();
+    config.data.folders = vec![folder.path().join("data")];
+    (folder, config)
+}
+
+/// Raises the stop flag, or panics, after an update.
+struct After<'a> {
+    step: u64,
+    stop: &'a AtomicBool,
+    panic: bool,
+}
+
+impl Progress for After<'_> {
+    fn step(&mut self, report: &StepReport, _remaining: f64) {
+        if report.step == self.step {
+            assert!(!self.panic, "killed");
+            self.stop.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+fn complete(trainer: &mut Trainer) {
+    let finish = trainer.run(&AtomicBool::new(false), &mut crate::train::progress::Silent).unwrap();
+    assert_eq!(finish, Finish::Complete);
+}
+
+fn file(folder: &Path, name: &str) -> Vec<u8> {
+    fs::read(folder.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+/// Loss and step of every line, without wall-clock times.
+fn losses(folder: &Path) -> Vec<(u64, Option<f64>)> {
+    let text = String::from_utf8(file(folder, "metrics.jsonl")).unwrap();
+    let record = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap();
+    text.lines().map(record).map(|r| (r["step"].as_u64().unwrap(), r["loss"].as_f64())).collect()
+}
+
+#[test]
+fn stopped_and_killed_runs_continue_to_the_bit() {
+    let (folder, mut config) = setup(4);
+    config.report.checkpoint_every = 2;
+    config.report.validate_every = 2;
+    let [whole, stopped, killed] = ["whole", "stopped", "killed"].map(|name| folder.path().join(name));
+    complete(&mut Trainer::create(&whole, config.clone(), "test").unwrap());
+
+    let stop = AtomicBool::new(false);
+    let mut trainer = Trainer::create(&stopped, config.clone(), "test").unwrap();
+    let finish = trainer.run(&stop, &mut After { step: 3, stop: &stop, panic: false }).unwrap();
+    assert_eq!((finish, trainer.steps_done()), (Finish::Stopped, 3));
+    let mut trainer = Trainer::resume(&stopped, "test").unwrap();
+    assert_eq!(trainer.steps_done(), 3);
+    complete(&mut trainer);
+
+    let mut trainer = Trainer::create(&killed, config, "test").unwrap();
+    let mut progress = After { step: 3, stop: &stop, panic: true };
+    let run = catch_unwind(AssertUnwindSafe(|| trainer.run(&AtomicBool::new(false), &mut progress)));
+    assert!(run.is_err());
+    let mut trainer = Trainer::resume(&killed, "test").unwrap();
+    assert_eq!(trainer.steps_done(), 2, "the last checkpoint");
+    complete(&mut trainer);
+
+    for other in [&stopped, &killed] {
+        for name in ["checkpoint/state.safetensors", "model.safetensors", "preview/step-000004.png"] {
+            assert!(file(&whole, name) == file(other, name), "{name} differs in {}", other.display());
+        }
+        assert_eq!(losses(&whole), losses(other));
+    }
+    // and another seed is another run
+    let (other, mut config) = setup(4);
+    config.seed = 1;
+    let path = other.path().join("seed");
+    complete(&mut Trainer::create(&path, config, "test").unwrap());
+    assert_ne!(file(&whole, "checkpoint/state.safetensors"), file(&path, "checkpoint/state.safetensors"));
+}
+
+#[test]
+fn a_tiny_model_learns_two_panoramas() {
+    let (folder, mut config) = setup(150);
+    config.augment = crate::data::AugmentConfig::default();
+    config.loss.kld = WeightSchedule::Constant(0.0);
+    let out = folder.path().join("run");
+    complete(&mut Trainer::create(&out, config, "test").unwrap());
+    let losses: Vec<f64> = losses(&out).into_iter().filter_map(|(_, loss)| loss).collect();
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    let (first, last) = (mean(&losses[..5]), mean(&losses[145..]));
+    assert!(last < first / 4.0, "loss {first} to {last}");
+    let model = Model::load(out.join("model.safetensors")).unwrap();
+    assert!(model.has_encoder() && model.has_prior());
+    let training = model.info().training.clone().unwrap();
+    assert_eq!((training.seed, training.command.as_str()), (0, "test"));
+}
+
+#[test]
+fn a_used_folder_and_a_damaged_checkpoint_are_refused() {
+    let (folder, mut config) = setup(1);
+    let out = folder.path().join("run");
+    complete(&mut Trainer::create(&out, config.clone(), "test").unwrap());
+    let message = Trainer::create(&out, config.clone(), "test").unwrap_err().to_string();
+    assert!(message.contains("not empty") && message.contains("--resume"), "{message}");
+    let state = out.join("checkpoint/state.safetensors");
+    let bytes = fs::read(&state).unwrap();
+    fs::write(&state, &bytes[..bytes.len() / 2]).unwrap();
+    let message = Trainer::resume(&out, "test").unwrap_err().to_string();
+    assert!(message.contains("state.safetensors") && message.contains("damaged"), "{message}");
+    config.data.folders = vec![folder.path().join("nowhere")];
+    let message = Trainer::create(&folder.path().join("other"), config, "test").unwrap_err().to_string();
+    assert!(message.contains("nowhere"), "{message}");
+    assert!(!folder.path().join("other").exists(), "nothing is left behind");
+}
+
+/// The whole chain, encoder to weighted loss: the analytic slope along a random direction of each parameter
+/// tensor against a central difference.
+#[test]
+fn gradients_of_the_whole_loss_match_finite_differences() {
+    let (folder, mut config) = setup(1);
+    config.loss.ldr_mse = WeightSchedule::Constant(1.0);
+    // |·| has a kink at every pixel whose gradient error is 0; too many for a finite step in f32
+    config.loss.mage = WeightSchedule::Constant(0.0);
+    let trainer = Trainer::create(&folder.path().join("run"), config, "test").unwrap();
+    let veni = trainer.network().clone();
+    let batch = Batches::new(trainer.config(), veni.stripes().unwrap(), &trainer.splits.train).prepare(1);
+    let value = |veni: &Veni| batch_loss(veni, &batch, &trainer.loss, &trainer.device).terms.total();
+    let gradients = weights::gradients(&veni, "", &value(&veni).backward());
+    let start = weights::read(&veni, "");
+    let mut checked = 0;
+    for (slot, (name, gradient)) in (0..).zip(&gradients) {
+        // along the gradient, where the slope is large, and a random direction, so that no component hides
+        let mut rng = stream(5, Purpose::Fit, 0, slot);
+        let random: Vec<f64> = gradient.data.iter().map(|_| crate::data::random::normal(&mut rng)).collect();
+        let gradient: Vec<f64> = gradient.data.iter().map(|g| f64::from(*g)).collect();
+        let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-30);
+        let (a, b) = (length(&gradient), length(&random));
+        let direction: Vec<f64> = gradient.iter().zip(&random).map(|(g, r)| g / a + r / b).collect();
+        let slope: f64 = direction.iter().zip(&gradient).map(|(d, g)| d * g).sum();
+        let at = |h: f64| {
+            let mut moved = start.clone();
+            let data = &mut moved.get_mut(name).unwrap().data;
+            data.iter_mut().zip(&direction).for_each(|(w, d)| *w += (h * d) as f32);
+            let moved = weights::write(veni.clone(), "", &moved).unwrap();
+            f64::from(value(&moved).into_scalar::<f32>())
+        };
+        // Richardson's combination of two central differences: an error of order h⁴
+        let h = 2e-3;
+        let difference = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+        // the loss of about 3 is rounded to 3e-7, which 8/(12 h) makes 1e-4; ReLUs add kinks
+        let allowed = 1e-3 + 0.02 * slope.abs();
+        assert!((difference - slope).abs() < allowed, "{name}: difference {difference}, gradient {slope}");
+        checked += usize::from(slope.abs() > 1e-2);
+    }
+    assert!(checked > gradients.len() / 2, "only {checked} of {} slopes rise above the noise", gradients.len());
+}
