@@ -108,3 +108,11 @@ fn a_model_without_encoder_says_so() {
     dir.ok(&["encode", &panorama(), "--model", model(), "-o", "code.json"]);
     dir.ok(&["bake", "code.json", "--model", &name, "--size", "16", "-o", "sky.exr"]);
 }
+
+#[cfg(feature = "pretrained")]
+#[test]
+fn the_model_inside_the_program_encodes() {
+    let dir = Dir::new();
+    let object = &dir.json(&["encode", &panorama()])[0];
+    assert!(object["ldr_psnr"].as_f64().unwrap() > 12.0, "{object}");
+}

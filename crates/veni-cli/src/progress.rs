@@ -9,6 +9,8 @@ use crate::report::{Report, to_stderr};
 
 /// Work shorter than this shows no progress at all.
 const PATIENCE: Duration = Duration::from_millis(700);
+/// The bar is drawn at most this often: a slow terminal must not hold up the work.
+const FRAME: Duration = Duration::from_millis(100);
 /// At most one plain line in this time.
 const LINE_INTERVAL: Duration = Duration::from_secs(5);
 
@@ -36,7 +38,7 @@ impl Progress {
             View::Silent
         } else if std::io::stderr().is_terminal() {
             let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
-            let template = "{wide_bar:.cyan/dim} {pos}/{len} {prefix} · {eta} left{msg}";
+            let template = "{bar:24.cyan/dim} {pos}/{len} {prefix} · {eta} left{wide_msg}";
             // the template is a constant; a wrong one would show in the first test
             bar.set_style(ProgressStyle::with_template(template).unwrap_or(ProgressStyle::default_bar()));
             bar.set_prefix(format!("{what}s"));
@@ -55,15 +57,17 @@ impl Progress {
         match &self.view {
             View::Silent => {}
             View::Bar(bar) => {
-                if self.shown.is_none() && waited >= PATIENCE {
+                let due = self.shown.map_or(waited >= PATIENCE, |last| last.elapsed() >= FRAME);
+                if !due {
+                    return;
+                }
+                if self.shown.is_none() {
                     bar.set_draw_target(ProgressDrawTarget::stderr());
-                    self.shown = Some(Instant::now());
                 }
+                self.shown = Some(Instant::now());
+                let detail = detail();
+                bar.set_message(if detail.is_empty() { detail } else { format!(" · {detail}") });
                 bar.set_position(done);
-                if self.shown.is_some() {
-                    let detail = detail();
-                    bar.set_message(if detail.is_empty() { detail } else { format!(" · {detail}") });
-                }
             }
             View::Lines => {
                 if self.shown.unwrap_or(self.started).elapsed() < LINE_INTERVAL {

@@ -75,7 +75,7 @@ pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<
             }
         }
     };
-    check(&latent, model).with_context(|| path.display().to_string())?;
+    check(&latent, loaded).with_context(|| path.display().to_string())?;
     if latent.model.is_none() {
         report.note(format_args!(
             "{}: does not say which model it belongs to; taken for this one",
@@ -87,16 +87,16 @@ pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<
 }
 
 /// A latent means something only to the decoder that it was made for.
-fn check(latent: &Latent, model: &Model) -> Result<()> {
+fn check(latent: &Latent, Loaded { model, name }: &Loaded) -> Result<()> {
     let (n, expected) = (latent.vectors.len(), model.latent_vectors());
     if n != expected {
         bail!(
-            "a latent of {n} vectors, but this model has {expected}: name the latent's own model with --model FILE"
+            "a latent of {n} vectors, but {name} has {expected}: name the latent's own model with --model FILE"
         );
     }
     match &latent.model {
         Some(hash) if *hash != model.hash() => bail!(
-            "a latent of model {hash}, but this is model {}: name the latent's own model with --model FILE",
+            "a latent of model {hash}, but {name} is {}: name the latent's own model with --model FILE",
             model.hash()
         ),
         _ => Ok(()),

@@ -17,7 +17,6 @@ use veni_core::train::config::DeviceKind;
 use veni_core::train::presets::Preset;
 use veni_core::train::run::{Finish, Trainer};
 
-use crate::args::Force;
 use crate::commands::inspect::run::{self, Best};
 use crate::output::{folder_of, with_remedy, writable};
 use crate::progress::duration;
@@ -86,8 +85,9 @@ pub(crate) struct Train {
     #[arg(long, conflicts_with = "force")]
     resume: bool,
 
-    #[command(flatten)]
-    force: Force,
+    /// Begin anew in place of the run in RUN, once the data is known to be good
+    #[arg(long, short)]
+    force: bool,
 }
 
 /// The presets by name.
@@ -195,7 +195,7 @@ impl Train {
         if !out.join("config.toml").is_file() {
             bail!("{}: is not empty and no run either; name a new folder with --out", out.display());
         }
-        if !self.force.force {
+        if !self.force {
             bail!(
                 "{}: holds a run already; --resume continues it, --force begins anew in its place",
                 out.display()
