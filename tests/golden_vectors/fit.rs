@@ -11,7 +11,8 @@ use veni::vae::Decoder;
 
 /// See [`Family`](crate::Family).
 pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
-    if !case.expects("out.losses") || !["VENIField", "RENIField"].contains(&case.module()) {
+    let start = case.expects("in.latent0") || case.expects("in.images");
+    if !start || !case.expects("out.losses") || !["VENIField", "RENIField"].contains(&case.module()) {
         return None;
     }
     if let Some(why) = field::unsupported(case) {
