@@ -121,6 +121,11 @@ impl Case {
         }
     }
 
+    /// The file.
+    pub(crate) fn path(&self) -> PathBuf {
+        self.folder.join(format!("{}.safetensors", self.name))
+    }
+
     /// Another case of the same folder, or `None` where that file is not there.
     pub(crate) fn sibling(&self, name: &str) -> Option<Self> {
         let path = self.folder.join(format!("{name}.safetensors"));
@@ -185,10 +190,16 @@ impl Case {
     /// Compares our numbers with the tensor `name` (`out.*`, `grad.*`), in row-major order.
     /// The number of elements must agree; sizes of one may differ in the shape.
     pub(crate) fn compare(&self, name: &str, ours: &Data) {
+        self.compare_within(name, ours, 0.0);
+    }
+
+    /// [`compare`](Self::compare), allowing at least `deviation`: what an input that the file does not record
+    /// is known to change.
+    pub(crate) fn compare_within(&self, name: &str, ours: &Data, deviation: f64) {
         let golden = self.data(name);
         self.compared.borrow_mut().insert(name.to_owned());
-        let tolerance = self.tolerances.get(name).copied().unwrap_or(Tolerance::UNKNOWN);
-        if let Err(message) = compare::check(ours, golden, tolerance) {
+        let rule = self.tolerances.get(name).copied().unwrap_or(Tolerance::UNKNOWN);
+        if let Err(message) = compare::check(ours, golden, rule.at_least(deviation)) {
             self.failures.borrow_mut().push(format!("{name}: {message}"));
         }
     }
@@ -206,6 +217,11 @@ impl Case {
     /// Whether something is to be compared under this name.
     pub(crate) fn expects(&self, name: &str) -> bool {
         self.tensors.contains_key(name)
+    }
+
+    /// Whether the file says how far f32 may be off.
+    pub(crate) fn has_tolerances(&self) -> bool {
+        !self.tolerances.is_empty()
     }
 
     /// How many tensors were compared.

@@ -17,6 +17,11 @@ impl Tolerance {
     /// For a tensor without an entry in the file: its own magnitude, no measured error.
     pub(crate) const UNKNOWN: Self = Self { f32_err: 0.0, max_abs: None };
 
+    /// The rule, and at least this absolute deviation.
+    pub(crate) fn at_least(self, deviation: f64) -> Self {
+        Self { f32_err: self.f32_err.max(0.1 * deviation), ..self }
+    }
+
     fn absolute(self, golden: &Data) -> f64 {
         let own = || golden.values.iter().fold(0.0, |m: f64, v| m.max(f64::from(v.abs())));
         (10.0 * self.f32_err).max(1e-6 + 1e-5 * self.max_abs.unwrap_or_else(own))

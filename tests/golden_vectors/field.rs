@@ -11,6 +11,7 @@ use rand::SeedableRng;
 use std::f32::consts::TAU;
 use veni::model::{DecoderConfig, VnReluForm};
 use veni::sphere::Equirect;
+use veni::sphere::reference::decoder_directions;
 use veni::vae::decoder::{Decoder, Linear, rotate};
 use veni::vae::weights::{self, Weight, Weights};
 
@@ -311,10 +312,9 @@ fn compare(case: &Case, device: &Device) -> Outcome {
     Compared
 }
 
-/// Pixel-centre directions of a map [H, W, 3] in the authors' decoder frame, (x, y, z) → (−y, −x, z) of ours.
+/// Pixel-centre directions of a map [H, W, 3] in the authors' decoder frame, rounded as theirs.
 pub(crate) fn map_directions(shape: &[usize], device: &Device) -> Tensor<2> {
     let [height, width, 3] = shape[..] else { panic!("{shape:?} is not the shape of a map") };
     let grid = Equirect::new(width, height);
-    let values = grid.directions().into_iter().flat_map(|[x, y, z]| [-y, -x, z]).collect();
-    Data::new([grid.len(), 3], values).tensor([grid.len(), 3], device)
+    Data::new([grid.len(), 3], decoder_directions(grid).into_flattened()).tensor([grid.len(), 3], device)
 }

@@ -1,11 +1,13 @@
 //! Latent optimisation under a fixed decoder: the authors' helper, and RENI++'s evaluation.
 
 use crate::case::{Case, Data};
-use crate::{Outcome, Outcome::Compared, Outcome::Skipped, field};
+use crate::{Outcome, Outcome::Compared, Outcome::Elsewhere, Outcome::Skipped, double, field};
 use burn::tensor::{Device, Tensor};
-use veni::fit::{FitConfig, FitTarget, fit};
+use veni::fit::{FitConfig, FitResult, FitTarget, fit};
 use veni::latent::Latent;
 use veni::sphere::Equirect;
+use veni::sphere::reference::{camera_to_native, decoder_directions};
+use veni::vae::Decoder;
 
 /// See [`Family`](crate::Family).
 pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
@@ -15,7 +17,14 @@ pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
     if let Some(why) = field::unsupported(case) {
         return Some(Skipped(why));
     }
-    if case.expects("in.latent0") { helper(case, device) } else { evaluation(case, device) }
+    if !double::active() {
+        return Some(Elsewhere(double::elsewhere(case, device)));
+    }
+    if case.expects("in.latent0") {
+        helper(case, device)
+    } else {
+        evaluation(case, device)
+    }
     Some(Compared)
 }
 
@@ -35,14 +44,26 @@ fn latents(data: &Data, batch: usize) -> Vec<Latent> {
     vectors.map(|z| Latent::new(z.as_chunks().0.iter().copied().map(across).collect())).collect()
 }
 
-/// Compares latents with a tensor in the authors' frame.
-fn compare_latents(case: &Case, name: &str, latents: &[Latent]) {
-    let values = latents.iter().flat_map(|z| z.vectors.iter().copied().flat_map(across)).collect();
-    case.compare(name, &Data::new(case.data(name).shape.clone(), values));
+/// A fit along the authors' directions, rounded as in their program: with steps of 0.1, the last bits of the
+/// directions change a latent coordinate by 1e-3 within 20 steps.
+fn run_fit(decoder: &Decoder, target: &FitTarget<'_>, start: &[Latent], config: &FitConfig) -> FitResult {
+    let directions: Vec<_> = decoder_directions(target.grid).into_iter().map(camera_to_native).collect();
+    let target = FitTarget { directions: Some(&directions), ..target.clone() };
+    fit(decoder, &target, start, config).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn compare_losses(case: &Case, losses: &[f64]) {
-    case.compare("out.losses", &Data::new([losses.len()], losses.iter().map(|v| *v as f32).collect()));
+/// Compares numbers with a record, allowing at least `deviation`.
+fn compare(case: &Case, name: &str, values: Vec<f32>, deviation: f64) {
+    case.compare_within(name, &Data::new(case.data(name).shape.clone(), values), deviation);
+}
+
+/// All coordinates, in the authors' frame.
+fn coordinates(fit: &FitResult) -> Vec<f32> {
+    fit.latents.iter().flat_map(|z| z.vectors.iter().copied().flat_map(across)).collect()
+}
+
+fn losses(fit: &FitResult) -> Vec<f32> {
+    fit.losses.iter().map(|v| *v as f32).collect()
 }
 
 /// One image with a mask, from a given latent.
@@ -50,18 +71,18 @@ fn helper(case: &Case, device: &Device) {
     let decoder = field::build(case, "", device);
     let (image, mask, start) = (case.data("in.image"), case.data("in.mask"), case.data("in.latent0"));
     let grid = Equirect::new(image.shape[1], image.shape[0]);
-    let target = FitTarget { grid, images: &[&image.values], masks: Some(&[&mask.values]) };
+    let target = FitTarget { grid, directions: None, images: &[&image.values], masks: Some(&[&mask.values]) };
     let last = number(case, "max_steps") as u64;
     let reference = FitConfig::reference_helper(number(case, "lr"), number(case, "lr_final"), last);
     let after = |steps| {
         let config = FitConfig { steps, epsilon: number(case, "adam_eps"), ..reference };
-        fit(&decoder, &target, &latents(start, 1), &config).unwrap_or_else(|e| panic!("{e}"))
+        run_fit(&decoder, &target, &latents(start, 1), &config)
     };
     let steps = number(case, "steps") as u64;
-    compare_losses(case, &after(steps).losses);
+    compare(case, "out.losses", losses(&after(steps)), 0.0);
     let recorded = case.tensors.keys().filter_map(|name| name.strip_prefix("out.latent"));
     for steps in recorded.map(|n| n.parse().expect("out.latent<steps>")) {
-        compare_latents(case, &format!("out.latent{steps}"), &after(steps).latents);
+        compare(case, &format!("out.latent{steps}"), coordinates(&after(steps)), 0.0);
     }
     let rates = (0..steps).map(|t| reference.learning_rate.at(t) as f32).collect();
     case.compare("out.lrs", &Data::new([steps as usize], rates));
@@ -81,7 +102,8 @@ fn evaluation(case: &Case, device: &Device) {
     let images = case.data("in.images");
     let [batch, height, width, 3] = images.shape[..] else { panic!("images of shape {:?}", images.shape) };
     let views: Vec<_> = images.values.chunks_exact(3 * width * height).collect();
-    let target = FitTarget { grid: Equirect::new(width, height), images: &views, masks: None };
+    let grid = Equirect::new(width, height);
+    let target = FitTarget { grid, directions: None, images: &views, masks: None };
     let mut start = latents(case.data("param.eval_mu"), batch);
     let scales = case.get("param.eval_scale");
     if let Some(scales) = scales {
@@ -93,11 +115,15 @@ fn evaluation(case: &Case, device: &Device) {
         free_exposure: scales.is_some(),
         ..FitConfig::reni_evaluation()
     };
-    let result = fit(&decoder, &target, &start, &config).unwrap_or_else(|e| panic!("{e}"));
-    compare_latents(case, "out.eval_mu20", &result.latents);
-    compare_losses(case, &result.losses);
+    let fit = run_fit(&decoder, &target, &start, &config);
+    // These files record no f32 error. The program behind them gathers a latent for every ray, so that the
+    // gradient is a sum of all rays one after the other in single precision; where they cancel, Adam turns
+    // the error into a part of its step. Allowed is a 4000th of the way that the steps could go.
+    let way = (0..config.steps).map(|t| config.learning_rate.at(t)).sum::<f64>();
+    let deviation = if case.has_tolerances() { 0.0 } else { way / 4000.0 };
+    compare(case, "out.eval_mu20", coordinates(&fit), deviation);
+    compare(case, "out.losses", losses(&fit), 0.0);
     if scales.is_some() {
-        let values = result.latents.iter().map(|z| z.log_exposure).collect();
-        case.compare("out.eval_scale20", &Data::new([batch], values));
+        compare(case, "out.eval_scale20", fit.latents.iter().map(|z| z.log_exposure).collect(), deviation);
     }
 }

@@ -8,6 +8,7 @@
 mod case;
 mod compare;
 mod directions;
+mod double;
 mod encoder;
 mod field;
 mod filler;
@@ -32,6 +33,8 @@ pub(crate) enum Outcome {
     Compared,
     /// Recognised, but not computed here; the reason is reported.
     Skipped(String),
+    /// Computed by another process ([`double`]).
+    Elsewhere(report::Verdict),
 }
 
 /// A module's entry: `None` when the case is not of its kind.

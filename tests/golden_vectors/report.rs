@@ -25,6 +25,7 @@ pub(crate) fn run_case(case: &Case, device: &Device) -> Verdict {
     match result {
         Ok(None) => Verdict::Skipped(format!("no module for {:?}", case.module())),
         Ok(Some(Outcome::Skipped(reason))) => Verdict::Skipped(reason),
+        Ok(Some(Outcome::Elsewhere(verdict))) => verdict,
         Ok(Some(Outcome::Compared)) => match (case.failures(), case.comparisons()) {
             (failures, _) if !failures.is_empty() => Verdict::Failed(failures),
             (_, 0) => Verdict::Failed(vec!["nothing was compared".into()]),

@@ -2,7 +2,7 @@
 
 use crate::case::{Case, Data};
 use crate::encoder::Official;
-use crate::{Outcome, Outcome::Compared, Outcome::Skipped, field};
+use crate::{Outcome, Outcome::Compared, Outcome::Elsewhere, Outcome::Skipped, double, field};
 use burn::tensor::{Device, Tensor};
 use serde_json::Value;
 use veni::model::StripeSampling;
@@ -18,6 +18,9 @@ use veni::vae::{Posterior, Veni};
 pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
     if case.module() != "VENIModel" || !case.expects("out.step1.loss") {
         return None;
+    }
+    if !double::active() {
+        return Some(Elsewhere(double::elsewhere(case, device)));
     }
     let field = field_case(case);
     if let Some(why) = field::unsupported(&field) {
@@ -46,11 +49,17 @@ fn compare(case: &Case, field: &Case, device: &Device) {
     let scene = Scene {
         stripes: [size("samples_per_img"), size("patch_size")],
         grid: Equirect::new(width, height),
-        images: case.data("in.image").values.chunks_exact(3 * width * height).map(|i| i.as_chunks().0).collect(),
+        images: case
+            .data("in.image")
+            .values
+            .chunks_exact(3 * width * height)
+            .map(|i| i.as_chunks().0)
+            .collect(),
     };
     let directions = field::map_directions(&[height, width, 3], device);
     let loss = Loss::new(&LossConfig::reference(), height, width, device);
-    let (groups, rates): (Vec<_>, Vec<_>) = ["decoder", "encoder"].map(|name| group(case, name)).into_iter().unzip();
+    let (groups, rates): (Vec<_>, Vec<_>) =
+        ["decoder", "encoder"].map(|name| group(case, name)).into_iter().unzip();
     let mut optimiser = Optimiser::new(&veni, groups, 0.0).expect("every parameter is in a group");
 
     let noise = case.data("in.eps");

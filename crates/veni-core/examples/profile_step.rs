@@ -68,23 +68,28 @@ fn main() -> Result<()> {
     for step in 1..=1 + STEPS {
         let counts = step > 1;
         let batch = clock.time("data (on another thread in a run)", counts, || batches.prepare(step));
-        let total = clock.time("whole step: forward", counts, || batch_loss(&veni, &batch, &loss, &device).terms.total());
+        let total = clock
+            .time("whole step: forward", counts, || batch_loss(&veni, &batch, &loss, &device).terms.total());
         let gradients = clock.time("whole step: backward", counts, || total.backward());
         let rates = [&config.decoder, &config.encoder].map(|g| g.learning_rate.at(step));
-        (veni, _) = clock.time("whole step: Adam, clipping, average", counts, || optimiser.step(veni, &gradients, &rates));
+        (veni, _) = clock
+            .time("whole step: Adam, clipping, average", counts, || optimiser.step(veni, &gradients, &rates));
 
         // the parts again, each on a graph of its own
         let posterior = clock.time("encoder alone: forward", counts, || encode(&veni, &batch, &device));
         clock.time("encoder alone: backward", counts, || posterior.mean.sum().backward());
         let [rows, columns] = batch.loss_size;
         let shape = [batch.images, rows, columns, 3];
-        let latent = tensor::<3>(&batch.noise, [batch.images, veni.latent_vectors(), 3], &device).require_grad();
+        let latent =
+            tensor::<3>(&batch.noise, [batch.images, veni.latent_vectors(), 3], &device).require_grad();
         let directions = tensor(&batch.loss_directions, [rows * columns, 3], &device);
-        let decoded = clock.time("decoder alone: forward", counts, || veni.decoder.forward(latent, directions));
+        let decoded =
+            clock.time("decoder alone: forward", counts, || veni.decoder.forward(latent, directions));
         let image: Tensor<4> = decoded.clone().detach().reshape(shape).require_grad();
         clock.time("decoder alone: backward", counts, || decoded.sum().backward());
         let target = tensor(&batch.target, shape, &device);
-        let value = clock.time("losses alone: forward", counts, || loss.terms(step, image, target, None).total());
+        let value =
+            clock.time("losses alone: forward", counts, || loss.terms(step, image, target, None).total());
         clock.time("losses alone: backward", counts, || value.backward());
     }
     for (part, seconds) in clock.0 {

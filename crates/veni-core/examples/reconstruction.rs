@@ -36,11 +36,21 @@ fn main() -> Result<()> {
     let pass = Reconstruction::autoencoder(&veni, &set, Alignment::Exposure)?;
     // a fit needs gradients in the latent
     let tracked = Veni::from_model(&model, &Device::flex().autodiff())?;
-    let best = Reconstruction::optimised(&tracked, &set, Start::Encoder, &FitConfig::thorough(), Alignment::Exposure)?;
+    let best = Reconstruction::optimised(
+        &tracked,
+        &set,
+        Start::Encoder,
+        &FitConfig::thorough(),
+        2,
+        Alignment::Exposure,
+    )?;
     println!("| panorama | LDR PSNR | HDR PSNR | SSIM | optimised LDR PSNR | HDR PSNR | SSIM |");
     println!("|---|---|---|---|---|---|---|");
     let row = |name: &str, a: &[f64; 3], b: &[f64; 3]| {
-        println!("| {name} | {:.2} | {:.2} | {:.3} | {:.2} | {:.2} | {:.3} |", a[0], a[1], a[2], b[0], b[1], b[2]);
+        println!(
+            "| {name} | {:.2} | {:.2} | {:.3} | {:.2} | {:.2} | {:.3} |",
+            a[0], a[1], a[2], b[0], b[1], b[2]
+        );
     };
     for ((name, a), (_, b)) in pass.images.iter().zip(&best.images) {
         row(name, &[a.ldr_psnr, a.hdr_psnr, a.ssim], &[b.ldr_psnr, b.hdr_psnr, b.ssim]);
@@ -83,8 +93,8 @@ fn draw(path: &Path, model: &Model, veni: &Veni, set: &Dataset) -> Result<()> {
         let mut target = Panorama::read(&item.path)?;
         target.sanitise()?;
         let random = Latent::from_seed(&prior, u64::from(r));
-        let [reconstruction, random] =
-            [latent, random].map(|z| decoder.condition(&z).map(|field| Panorama::new(grid, field.bake(grid))));
+        let [reconstruction, random] = [latent, random]
+            .map(|z| decoder.condition(&z).map(|field| Panorama::new(grid, field.bake(grid))));
         for (c, panorama) in (0..).zip([target.resample(grid), reconstruction?, random?]) {
             let tonemap = Tonemap::reference(&panorama);
             for (p, pixel) in (0..).zip(panorama.pixels()) {

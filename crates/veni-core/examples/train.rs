@@ -24,9 +24,14 @@ impl Progress for Print {
 
     fn step(&mut self, report: &StepReport, remaining: f64) {
         if report.step.is_multiple_of(25) || report.step <= 5 {
-            let parts: Vec<_> = report.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
+            let parts: Vec<_> =
+                report.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
             let (step, loss, seconds) = (report.step, report.loss, report.seconds);
-            println!("{step} loss {loss:.4} ({}) {seconds:.3} s, {:.1} min left", parts.join(", "), remaining / 60.0);
+            println!(
+                "{step} loss {loss:.4} ({}) {seconds:.3} s, {:.1} min left",
+                parts.join(", "),
+                remaining / 60.0
+            );
         }
     }
 

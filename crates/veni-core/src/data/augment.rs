@@ -12,8 +12,8 @@
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::data::random::{below, normal, signed, uniform};
 use crate::data::exposure::centre_exposure;
+use crate::data::random::{below, normal, signed, uniform};
 use crate::sphere::Equirect;
 
 /// Strengths and probabilities. The default is off: the identity.
@@ -62,7 +62,9 @@ impl AugmentConfig {
         ];
         for (name, value, most) in fields {
             if !(0.0..=most).contains(&value) {
-                return Err(crate::Error::invalid(format!("augment.{name} = {value}: must lie in 0..={most}")));
+                return Err(crate::Error::invalid(format!(
+                    "augment.{name} = {value}: must lie in 0..={most}"
+                )));
             }
         }
         Ok(())
@@ -162,8 +164,8 @@ pub fn polar_warp(grid: Equirect, image: &[f32], amplitude: f64) -> Vec<f32> {
     for j in 0..grid.height {
         let theta = grid.polar(j);
         let source = theta + 0.5 * amplitude * (2.0 * theta).sin();
-        let position = (source / std::f64::consts::PI * grid.height as f64 - 0.5)
-            .clamp(0.0, (grid.height - 1) as f64);
+        let position =
+            (source / std::f64::consts::PI * grid.height as f64 - 0.5).clamp(0.0, (grid.height - 1) as f64);
         let low = (position as usize).min(grid.height.saturating_sub(2));
         let high = (low + 1).min(grid.height - 1);
         let t = (position - low as f64) as f32;
@@ -251,7 +253,8 @@ mod tests {
     #[test]
     fn the_same_stream_gives_the_same_image_at_exposure_zero() {
         let (a, b) = (image(1), image(2));
-        let run = |slot| strong().apply(GRID, &a, &mut stream(0, Purpose::Augment, 5, slot), |_| b.as_slice());
+        let run =
+            |slot| strong().apply(GRID, &a, &mut stream(0, Purpose::Augment, 5, slot), |_| b.as_slice());
         for slot in 0..20 {
             let out = run(slot);
             assert_eq!(out, run(slot));

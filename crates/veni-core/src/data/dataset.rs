@@ -82,7 +82,14 @@ impl Dataset {
     pub fn new(grid: Equirect, items: Vec<Item>) -> Self {
         for item in &items {
             let (have, want) = (item.log_radiance.len(), 3 * grid.len());
-            assert_eq!(have, want, "{}: {have} values on a {} × {} grid", item.path.display(), grid.width, grid.height);
+            assert_eq!(
+                have,
+                want,
+                "{}: {have} values on a {} × {} grid",
+                item.path.display(),
+                grid.width,
+                grid.height
+            );
         }
         Self { grid, items }
     }
@@ -154,7 +161,10 @@ impl Splits {
         val.sort();
         if train.is_empty() {
             let names: Vec<_> = config.folders.iter().map(|f| f.display().to_string()).collect();
-            return Err(Error::invalid(format!("{}: no .exr or .hdr panorama to train on", names.join(", "))));
+            return Err(Error::invalid(format!(
+                "{}: no .exr or .hdr panorama to train on",
+                names.join(", ")
+            )));
         }
         Ok(Self { train: Dataset::load(&train, grid)?, val: Dataset::load(&val, grid)? })
     }
@@ -197,7 +207,8 @@ mod tests {
         for (i, name) in (0_u8..).zip(names) {
             let path = folder.path().join(name);
             fs::create_dir_all(path.parent().unwrap()).unwrap();
-            let sky = Panorama::from_fn(Equirect::new(16, 8), |d| [0.1 + f32::from(i), 1.5 + d[0], 2.0 + d[2]]);
+            let sky =
+                Panorama::from_fn(Equirect::new(16, 8), |d| [0.1 + f32::from(i), 1.5 + d[0], 2.0 + d[2]]);
             sky.write(&path, &WriteOptions::new(WriteFormat::Exr(Precision::Float))).unwrap();
         }
         folder
@@ -215,7 +226,10 @@ mod tests {
     fn folders_named_train_and_val_decide() {
         let folder = folder(&["train/b.exr", "train/a.exr", "val/c.exr", "train/deeper/d.exr"]);
         let splits = Splits::open(&config(folder.path()), 0).unwrap();
-        assert_eq!((names(&splits.train), names(&splits.val)), (vec!["a".into(), "b".into()], vec!["c".into()]));
+        assert_eq!(
+            (names(&splits.train), names(&splits.val)),
+            (vec!["a".into(), "b".into()], vec!["c".into()])
+        );
     }
 
     #[test]
@@ -251,6 +265,8 @@ mod tests {
         let empty = tempfile::tempdir().unwrap();
         let message = Splits::open(&config(empty.path()), 0).unwrap_err().to_string();
         assert!(message.contains(&empty.path().display().to_string()), "{message}");
-        assert!(Splits::open(&DataConfig::default(), 0).unwrap_err().to_string().contains("at least one folder"));
+        assert!(
+            Splits::open(&DataConfig::default(), 0).unwrap_err().to_string().contains("at least one folder")
+        );
     }
 }

@@ -102,7 +102,10 @@ mod tests {
         }
         // five standard errors
         assert!((u - 0.5).abs() < 5.0 * 0.289 / f64::from(n).sqrt());
-        assert!(g.abs() < 5.0 / f64::from(n).sqrt() && (g2 - 1.0).abs() < 5.0 * 2_f64.sqrt() / f64::from(n).sqrt());
+        assert!(
+            g.abs() < 5.0 / f64::from(n).sqrt()
+                && (g2 - 1.0).abs() < 5.0 * 2_f64.sqrt() / f64::from(n).sqrt()
+        );
     }
 
     #[test]

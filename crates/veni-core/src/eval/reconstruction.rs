@@ -97,9 +97,10 @@ impl Reconstruction {
         let mut latents = Vec::with_capacity(dataset.len());
         // a few at a time: the graph of a fit holds every activation of its images
         for (items, start) in dataset.items().chunks(4).zip(start.chunks(4)) {
-            let images: Vec<_> = items.iter().map(|i| averaged(dataset.grid(), &i.log_radiance, factor)).collect();
+            let images: Vec<_> =
+                items.iter().map(|i| averaged(dataset.grid(), &i.log_radiance, factor)).collect();
             let images: Vec<_> = images.iter().map(Vec::as_slice).collect();
-            let target = FitTarget { grid, images: &images, masks: None };
+            let target = FitTarget { grid, directions: None, images: &images, masks: None };
             latents.extend(fit(&veni.decoder, &target, start, config)?.latents);
         }
         Ok(Self::of_latents(veni, dataset, &latents, alignment))

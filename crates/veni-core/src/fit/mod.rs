@@ -93,6 +93,8 @@ fn exponential(rate: f64, last: f64, steps: u64) -> LearningRate {
 pub struct FitTarget<'a> {
     /// Their pixels.
     pub grid: Equirect,
+    /// Unit directions of the pixels, row-major, if they are not exactly those of the grid.
+    pub directions: Option<&'a [[f32; 3]]>,
     /// Log radiance, 3·W·H values each.
     pub images: &'a [&'a [f32]],
     /// How much each pixel counts, W·H values per image, 0 where unknown; absent: all count.
@@ -135,7 +137,9 @@ pub fn fit(
         let loss = problem.loss(&decoder, z.clone(), s.clone());
         let value = f64::from(loss.clone().into_scalar::<f32>());
         if !value.is_finite() {
-            return Err(Error::invalid(format!("the fit's loss is {value} at step {step}; lower its learning rate")));
+            return Err(Error::invalid(format!(
+                "the fit's loss is {value} at step {step}; lower its learning rate"
+            )));
         }
         losses.push(value);
         let gradients = loss.backward();
@@ -146,7 +150,8 @@ pub fn fit(
         }
     }
     let vectors = latent.values.as_chunks().0.chunks_exact(n).map(<[[f32; 3]]>::to_vec);
-    let latents = vectors.zip(exposure.values).map(|(v, log_exposure)| Latent { log_exposure, ..Latent::new(v) });
+    let latents =
+        vectors.zip(exposure.values).map(|(v, log_exposure)| Latent { log_exposure, ..Latent::new(v) });
     Ok(FitResult { latents: latents.collect(), losses })
 }
 
@@ -156,15 +161,23 @@ fn check(decoder: &Decoder, target: &FitTarget<'_>, start: &[Latent]) -> Result<
         return Err(Error::invalid(format!("{images} images and {} latents to start from", start.len())));
     }
     if let Some(wrong) = start.iter().find(|z| z.vectors.len() != n) {
-        return Err(Error::invalid(format!("a start has {} vectors, the decoder takes {n}", wrong.vectors.len())));
+        return Err(Error::invalid(format!(
+            "a start has {} vectors, the decoder takes {n}",
+            wrong.vectors.len()
+        )));
     }
     let pixels = target.grid.len();
     if let Some(wrong) = target.images.iter().find(|image| image.len() != 3 * pixels) {
         return Err(Error::invalid(format!("an image has {} values, its grid {pixels} pixels", wrong.len())));
     }
+    if let Some(directions) = target.directions.filter(|d| d.len() != pixels) {
+        return Err(Error::invalid(format!("{} directions for {pixels} pixels", directions.len())));
+    }
     if let Some(masks) = target.masks {
         if masks.len() != images || masks.iter().any(|m| m.len() != pixels) {
-            return Err(Error::invalid(format!("{images} images of {pixels} pixels need as many masks of that size")));
+            return Err(Error::invalid(format!(
+                "{images} images of {pixels} pixels need as many masks of that size"
+            )));
         }
         if masks.iter().any(|m| !(m.iter().sum::<f32>() > 0.0 && m.iter().all(|v| *v >= 0.0))) {
             return Err(Error::invalid("a mask covers nothing, or has negative values"));
@@ -190,7 +203,8 @@ impl Problem {
         let constant = |values: Vec<f32>, channels| {
             Tensor::<4>::from_data(TensorData::new(values, [batch, height, width, channels]), device)
         };
-        let directions = TensorData::new(target.grid.directions().into_flattened(), [target.grid.len(), 3]);
+        let directions = target.directions.map_or_else(|| target.grid.directions(), <[_]>::to_vec);
+        let directions = TensorData::new(directions.into_flattened(), [target.grid.len(), 3]);
         Self {
             objective: config.objective,
             prior: config.prior,
@@ -208,7 +222,8 @@ impl Problem {
     fn loss(&self, decoder: &Decoder, latent: Tensor<3>, log_exposure: Tensor<4>) -> Tensor<1> {
         let prediction = decoder.forward(latent.clone(), self.directions.clone()).reshape(self.target.dims());
         let (p, i) = (prediction + log_exposure, self.target.clone());
-        let log_error = |form, p, i| mse::mse(form, mse::Space::Log, p, i, self.rows.clone(), self.mask.clone());
+        let log_error =
+            |form, p, i| mse::mse(form, mse::Space::Log, p, i, self.rows.clone(), self.mask.clone());
         let image = match self.objective {
             Objective::LogError => log_error(LossForm::Corrected, p, i),
             Objective::ReferenceLogError => log_error(LossForm::Reference, p, i),
@@ -247,7 +262,8 @@ impl Variable {
     /// precision: these are few numbers, and a tiny ε amplifies every rounding.
     fn update<const D: usize>(&mut self, gradient: Option<Tensor<D>>, rate: f64, t: u64) {
         let gradient = gradient.expect("the loss depends on every latent");
-        let gradient: Vec<f32> = gradient.into_data().convert::<f32>().try_into_vec().expect("just converted to f32");
+        let gradient: Vec<f32> =
+            gradient.into_data().convert::<f32>().try_into_vec().expect("just converted to f32");
         let (bias1, bias2) = (1.0 - 0.9_f64.powf(t as f64), 1.0 - 0.999_f64.powf(t as f64));
         let moments = self.first.iter_mut().zip(&mut self.second);
         for ((x, (m, v)), g) in self.values.iter_mut().zip(moments).zip(gradient.into_iter().map(f64::from)) {
@@ -284,9 +300,10 @@ mod tests {
         let (decoder, grid) = (decoder(), Equirect::new(16, 8));
         let images = [1, 2].map(|seed| image(&decoder, grid, seed));
         let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
-        let target = FitTarget { grid, images: &views, masks: None };
+        let target = FitTarget { grid, directions: None, images: &views, masks: None };
         let config = FitConfig { prior: 0.0, ..FitConfig::thorough() };
-        let moved = |seed| Latent::new(latent(seed).vectors.into_iter().map(|v| v.map(|c| c + 0.03)).collect());
+        let moved =
+            |seed| Latent::new(latent(seed).vectors.into_iter().map(|v| v.map(|c| c + 0.03)).collect());
         let start = [1, 2].map(moved);
         let result = fit(&decoder, &target, &start, &config).unwrap();
         let (first, last) = (result.losses[0], *result.losses.last().unwrap());
@@ -303,7 +320,7 @@ mod tests {
             image[3 * p..3 * p + 3].fill(50.0);
         }
         let run = |image: &[f32], free_exposure| {
-            let target = FitTarget { grid, images: &[image], masks: Some(&[&mask]) };
+            let target = FitTarget { grid, directions: None, images: &[image], masks: Some(&[&mask]) };
             let config = FitConfig { steps: 60, prior: 0.0, free_exposure, ..FitConfig::thorough() };
             fit(&decoder, &target, &[latent(1)], &config).unwrap()
         };
@@ -320,12 +337,14 @@ mod tests {
         let (decoder, grid) = (decoder(), Equirect::new(4, 2));
         let image = vec![0.0; 24];
         let message = |images: &[&[f32]], masks, start: &[Latent]| {
-            let target = FitTarget { grid, images, masks };
+            let target = FitTarget { grid, directions: None, images, masks };
             fit(&decoder, &target, start, &FitConfig::thorough()).unwrap_err().to_string()
         };
         assert!(message(&[], None, &[]).contains("0 images"));
         assert!(message(&[&image[1..]], None, &[latent(1)]).contains("23 values"));
-        assert!(message(&[&image], None, &[Latent::new(latent(1).vectors[..2].to_vec())]).contains("2 vectors"));
+        assert!(
+            message(&[&image], None, &[Latent::new(latent(1).vectors[..2].to_vec())]).contains("2 vectors")
+        );
         let empty = [0.0; 8];
         assert!(message(&[&image], Some(&[&empty]), &[latent(1)]).contains("mask"));
     }

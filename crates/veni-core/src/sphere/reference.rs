@@ -24,9 +24,23 @@ pub fn encoder_to_native([x, y, z]: [f32; 3]) -> [f32; 3] {
 }
 
 /// The decoder's directions for an image, camera frame, row-major: with s = 2(i+½)/W − 1 and θ = π(j+½)/H,
-/// d = (sin πs sin θ, −cos πs sin θ, cos θ).
+/// d = (sin πs sin θ, −cos πs sin θ, cos θ), normalised once more. In single precision, step by step as the
+/// authors' program does: a latent fit with large steps amplifies the last bit of a direction ten-thousandfold.
+/// (What remains is the last bit of the sine itself, in one row or column of ten.)
 pub fn decoder_directions(grid: Equirect) -> Vec<[f32; 3]> {
-    grid.directions().into_iter().map(camera_to_native).collect()
+    let (w, h) = (grid.width as f32, grid.height as f32);
+    let columns: Vec<_> =
+        (0..grid.width).map(|i| (PI * ((i as f32 + 0.5 - 0.5 * w) / (0.5 * w))).sin_cos()).collect();
+    let mut out = Vec::with_capacity(grid.len());
+    for j in 0..grid.height {
+        let (sin_t, cos_t) = (PI * (0.5 + (j as f32 + 0.5 - 0.5 * h) / h)).sin_cos();
+        out.extend(columns.iter().map(|(sin, cos)| {
+            let [x, y, z] = [sin * sin_t, -(cos * sin_t), cos_t];
+            let length = z.mul_add(z, y.mul_add(y, x * x)).sqrt();
+            [x / length, y / length, z / length]
+        }));
+    }
+    out
 }
 
 /// The encoder's line sampling, encoder frame, [T, P] row-major: meridians t = linspace(−1, 1, w), heights

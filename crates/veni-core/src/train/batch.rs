@@ -73,7 +73,8 @@ impl<'a> Batches<'a> {
         };
         for slot in 0..self.batch {
             let image = self.augmented(self.choice(step, slot), step, slot as u64);
-            let yaw = std::f64::consts::TAU * uniform(&mut stream(self.seed, Purpose::Sampling, step, 1 + slot as u64));
+            let yaw = std::f64::consts::TAU
+                * uniform(&mut stream(self.seed, Purpose::Sampling, step, 1 + slot as u64));
             // the grid is turned, not the image: samples and directions lie at −yaw, in the image's own frame
             let samples = self.stripes.gather_turned(grid, yaw).sample(image.as_chunks().0);
             batch.stripe_samples.extend(samples.into_flattened());
@@ -95,7 +96,8 @@ impl<'a> Batches<'a> {
         let items = self.train.items();
         let mut rng = stream(self.seed, Purpose::Augment, step, slot);
         let image = &items[index].log_radiance;
-        self.augment.apply(self.train.grid(), image, &mut rng, |rng| &items[below(rng, items.len())].log_radiance)
+        self.augment
+            .apply(self.train.grid(), image, &mut rng, |rng| &items[below(rng, items.len())].log_radiance)
     }
 
     fn choice(&self, step: u64, slot: usize) -> usize {
@@ -104,7 +106,8 @@ impl<'a> Batches<'a> {
             Order::Replacement => below(&mut stream(self.seed, Purpose::Order, step, slot as u64), n),
             Order::Shuffle => {
                 let drawn = (step - 1) as usize * self.batch + slot;
-                permutation(&mut stream(self.seed, Purpose::Order, (drawn / n) as u64, u64::MAX), n)[drawn % n]
+                permutation(&mut stream(self.seed, Purpose::Order, (drawn / n) as u64, u64::MAX), n)
+                    [drawn % n]
             }
         }
     }
@@ -139,7 +142,9 @@ impl LossView {
             }
             LossGrid::Strided { factor } => (0..rows)
                 .flat_map(|j| (0..columns).map(move |i| (j, i)))
-                .flat_map(|(j, i)| self.grid.direction(self.offset[1] + i * factor, self.offset[0] + j * factor))
+                .flat_map(|(j, i)| {
+                    self.grid.direction(self.offset[1] + i * factor, self.offset[0] + j * factor)
+                })
                 .collect(),
         }
     }

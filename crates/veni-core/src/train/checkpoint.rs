@@ -60,7 +60,8 @@ pub fn save(path: &Path, state: &Weights, info: &CheckpointInfo) -> Result<()> {
         views.push((name.as_str(), view.map_err(|e| Error::invalid(format!("tensor {name}: {e}")))?));
     }
     let header = HashMap::from([(KEY.to_owned(), json)]);
-    let file = safetensors::serialize(views, Some(header)).map_err(|e| Error::invalid(format!("checkpoint: {e}")))?;
+    let file = safetensors::serialize(views, Some(header))
+        .map_err(|e| Error::invalid(format!("checkpoint: {e}")))?;
     write_atomic(path, Overwrite::Replace, |out| {
         out.write_all(&file).map_err(|e| Error::io(path, "write", e))
     })
@@ -95,7 +96,8 @@ fn parse(bytes: &[u8]) -> Result<(Weights, CheckpointInfo)> {
         if view.dtype() != Dtype::F32 {
             return Err(damaged(&format!("tensor {name} is {:?}, not F32", view.dtype())));
         }
-        let data: Vec<f32> = view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        let data: Vec<f32> =
+            view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         if let Some(bad) = data.iter().find(|v| !v.is_finite()) {
             return Err(damaged(&format!("tensor {name} holds {bad}")));
         }

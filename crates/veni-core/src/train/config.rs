@@ -168,7 +168,8 @@ impl TrainConfig {
     /// # Errors
     /// [`Error::Invalid`] naming the override that has no `=`, no such key, or a value of the wrong type.
     pub fn with_overrides<S: AsRef<str>>(&self, overrides: &[S]) -> Result<Self> {
-        let broken = |text: &str, e: &dyn std::fmt::Display| Error::invalid(format!("override `{text}`: {e}"));
+        let broken =
+            |text: &str, e: &dyn std::fmt::Display| Error::invalid(format!("override `{text}`: {e}"));
         let mut config = self.clone();
         for text in overrides.iter().map(AsRef::as_ref) {
             let (path, value) = text.split_once('=').ok_or_else(|| broken(text, &"has no `=`"))?;
@@ -180,7 +181,8 @@ impl TrainConfig {
             if config.steps != steps {
                 for group in [&mut config.decoder, &mut config.encoder] {
                     match &mut group.learning_rate {
-                        LearningRate::Cosine { steps: end, .. } | LearningRate::Exponential { steps: end, .. }
+                        LearningRate::Cosine { steps: end, .. }
+                        | LearningRate::Exponential { steps: end, .. }
                             if *end == steps =>
                         {
                             *end = config.steps;
@@ -208,7 +210,8 @@ impl TrainConfig {
     /// # Errors
     /// [`Error::Invalid`] if a number has no TOML form.
     pub fn to_toml(&self) -> Result<String> {
-        toml::to_string_pretty(self).map_err(|e| Error::invalid(format!("the configuration has no TOML form: {e}")))
+        toml::to_string_pretty(self)
+            .map_err(|e| Error::invalid(format!("the configuration has no TOML form: {e}")))
     }
 
     /// Checks what types cannot.
@@ -224,7 +227,9 @@ impl TrainConfig {
         let factor = self.loss_grid.factor();
         let (w, h) = (self.data.width, self.data.height);
         if factor == 0 || !w.is_multiple_of(factor) || !h.is_multiple_of(factor) {
-            return Err(Error::invalid(format!("loss_grid.factor = {factor} does not divide {w} × {h} pixels")));
+            return Err(Error::invalid(format!(
+                "loss_grid.factor = {factor} does not divide {w} × {h} pixels"
+            )));
         }
         if self.batch == 0 {
             return Err(Error::invalid("batch = 0: needs at least one panorama per step"));
@@ -235,7 +240,9 @@ impl TrainConfig {
         for (name, group) in [("decoder", &self.decoder), ("encoder", &self.encoder)] {
             let ends = [0, self.steps / 2, self.steps].map(|step| group.learning_rate.at(step));
             if let Some(rate) = ends.into_iter().find(|rate| !(*rate >= 0.0 && rate.is_finite())) {
-                return Err(Error::invalid(format!("{name}.learning_rate = {rate}: must be finite and at least 0")));
+                return Err(Error::invalid(format!(
+                    "{name}.learning_rate = {rate}: must be finite and at least 0"
+                )));
             }
         }
         Ok(())
@@ -286,7 +293,13 @@ mod tests {
     fn overrides_reach_every_level_and_keep_types() {
         let config = Preset::Small.config(9);
         let changed = config
-            .with_overrides(&["steps=500", "loss.kld=1", "model.encoder.depth=2", "device=ndarray", "order = shuffle"])
+            .with_overrides(&[
+                "steps=500",
+                "loss.kld=1",
+                "model.encoder.depth=2",
+                "device=ndarray",
+                "order = shuffle",
+            ])
             .unwrap();
         assert_eq!(changed.steps, 500);
         assert_eq!(changed.loss.kld, crate::train::schedule::WeightSchedule::Constant(1.0));

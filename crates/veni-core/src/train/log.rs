@@ -39,7 +39,8 @@ impl MetricsLog {
     /// # Errors
     /// [`Error::Io`] if it cannot be written.
     pub(super) fn append(&mut self, record: &impl Serialize) -> Result<()> {
-        let mut line = serde_json::to_vec(record).map_err(|e| Error::invalid(format!("metrics record: {e}")))?;
+        let mut line =
+            serde_json::to_vec(record).map_err(|e| Error::invalid(format!("metrics record: {e}")))?;
         line.push(b'\n');
         // one write per line: a kill leaves at most one torn line
         self.file.write_all(&line).map_err(|e| Error::io(&self.path, "write", e))

@@ -91,7 +91,8 @@ impl Optimiser {
         for (path, weight) in weights::read(module, "") {
             let inside = |g: &Group| path.strip_prefix(&g.prefix).is_some_and(|rest| rest.starts_with('.'));
             let group = groups.iter().position(inside);
-            let group = group.ok_or_else(|| Error::invalid(format!("parameter {path} is in no optimiser group")))?;
+            let group =
+                group.ok_or_else(|| Error::invalid(format!("parameter {path} is in no optimiser group")))?;
             let zeros = vec![0.0; weight.data.len()];
             let average = weight.data.clone();
             slots.insert(path, Slot { group, weight, first: zeros.clone(), second: zeros, average });
@@ -127,9 +128,11 @@ impl Optimiser {
                 slot.update(&gradient.data, &rules[slot.group]);
             }
         }
-        let module = weights::write(module, "", &self.weights()).expect("the module that the state was made for");
+        let module =
+            weights::write(module, "", &self.weights()).expect("the module that the state was made for");
         let reports = norms.iter().zip(learning_rates);
-        let reports = reports.map(|(&gradient_norm, &learning_rate)| GroupReport { gradient_norm, learning_rate });
+        let reports =
+            reports.map(|(&gradient_norm, &learning_rate)| GroupReport { gradient_norm, learning_rate });
         (module, reports.collect())
     }
 
@@ -148,8 +151,13 @@ impl Optimiser {
     pub fn state(&self) -> Weights {
         let mut out = Weights::new();
         for (path, slot) in &self.slots {
-            for (part, data) in PARTS.iter().zip([&slot.weight.data, &slot.first, &slot.second, &slot.average]) {
-                out.insert(format!("{part}.{path}"), Weight { shape: slot.weight.shape.clone(), data: data.clone() });
+            for (part, data) in
+                PARTS.iter().zip([&slot.weight.data, &slot.first, &slot.second, &slot.average])
+            {
+                out.insert(
+                    format!("{part}.{path}"),
+                    Weight { shape: slot.weight.shape.clone(), data: data.clone() },
+                );
             }
         }
         out
@@ -164,7 +172,8 @@ impl Optimiser {
             let targets = [&mut slot.weight.data, &mut slot.first, &mut slot.second, &mut slot.average];
             for (part, target) in PARTS.iter().zip(targets) {
                 let name = format!("{part}.{path}");
-                let found = state.remove(&name).ok_or_else(|| Error::invalid(format!("tensor {name} is missing")))?;
+                let found =
+                    state.remove(&name).ok_or_else(|| Error::invalid(format!("tensor {name} is missing")))?;
                 if found.shape != slot.weight.shape {
                     return Err(Error::invalid(format!(
                         "tensor {name} has shape {:?}, the model needs {:?}",
@@ -291,7 +300,8 @@ mod tests {
             for i in 0..4 {
                 m[i] = 0.9 * m[i] + 0.1 * g[i];
                 v[i] = 0.999 * v[i] + 0.001 * g[i] * g[i];
-                let hat = (m[i] / (1.0 - 0.9_f64.powi(t))) / ((v[i] / (1.0 - 0.999_f64.powi(t))).sqrt() + 1e-8);
+                let hat =
+                    (m[i] / (1.0 - 0.9_f64.powi(t))) / ((v[i] / (1.0 - 0.999_f64.powi(t))).sqrt() + 1e-8);
                 if i < 2 {
                     a[i] -= rates[0] * hat;
                 } else {
@@ -306,7 +316,10 @@ mod tests {
         }
         let close = |ours: &Param<Tensor<1>>, want: [f64; 2]| {
             let ours: Vec<f32> = ours.val().into_data().try_into_vec().unwrap();
-            assert!(ours.iter().zip(want).all(|(o, w)| (f64::from(*o) - w).abs() < 1e-6), "{ours:?} {want:?}");
+            assert!(
+                ours.iter().zip(want).all(|(o, w)| (f64::from(*o) - w).abs() < 1e-6),
+                "{ours:?} {want:?}"
+            );
         };
         close(&toy.a.x, a);
         close(&toy.b.x, b);

@@ -79,9 +79,12 @@ impl Trainer {
     pub fn create(folder: &Path, config: TrainConfig, command: &str) -> Result<Self> {
         config.check()?;
         let splits = Splits::open(&config.data, config.seed)?;
-        if folder.exists() && fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?.next().is_some() {
+        if folder.exists() && fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?.next().is_some()
+        {
             let folder = folder.display();
-            return Err(Error::invalid(format!("{folder}: is not empty; --resume continues a run, or name a new folder")));
+            return Err(Error::invalid(format!(
+                "{folder}: is not empty; --resume continues a run, or name a new folder"
+            )));
         }
         for inner in ["checkpoint", "preview"] {
             let inner = folder.join(inner);
@@ -119,7 +122,8 @@ impl Trainer {
         let device = config.device.device()?.autodiff();
         let veni = Veni::new(&config.model, &mut stream(config.seed, Purpose::Weights, 0, 0), &device)?;
         let groups = GROUPS.iter().zip([&config.decoder, &config.encoder]);
-        let groups = groups.map(|(prefix, group)| Group { prefix: (*prefix).into(), adam: group.adam }).collect();
+        let groups =
+            groups.map(|(prefix, group)| Group { prefix: (*prefix).into(), adam: group.adam }).collect();
         let optimiser = Optimiser::new(&veni, groups, config.ema_decay)?;
         let [height, width] = [config.data.height, config.data.width].map(|n| n / config.loss_grid.factor());
         let loss = Loss::new(&config.loss, height, width, &device);
@@ -215,15 +219,22 @@ impl Trainer {
         }
         let gradients = total.backward();
         // schedules count from 0: with a warm-up the first update has rate 0, as the authors' has
-        let rates = [&self.config.decoder, &self.config.encoder].map(|group| group.learning_rate.at(batch.step - 1));
+        let rates =
+            [&self.config.decoder, &self.config.encoder].map(|group| group.learning_rate.at(batch.step - 1));
         let (veni, groups) = self.optimiser.step(self.veni.clone(), &gradients, &rates);
         self.veni = veni;
         let seconds = clock.elapsed().as_secs_f64();
-        let by_name = |f: &dyn Fn(usize) -> f64| GROUPS.iter().enumerate().map(|(i, name)| (*name, f(i))).collect();
+        let by_name =
+            |f: &dyn Fn(usize) -> f64| GROUPS.iter().enumerate().map(|(i, name)| (*name, f(i))).collect();
         Ok(StepReport {
             step: batch.step,
             loss: value,
-            parts: loss.terms.terms.into_iter().map(|t| (t.name, f64::from(t.value.into_scalar::<f32>()))).collect(),
+            parts: loss
+                .terms
+                .terms
+                .into_iter()
+                .map(|t| (t.name, f64::from(t.value.into_scalar::<f32>())))
+                .collect(),
             learning_rate: by_name(&|i| groups[i].learning_rate),
             gradient_norm: by_name(&|i| groups[i].gradient_norm),
             seconds,
@@ -316,7 +327,8 @@ impl Trainer {
         let step = self.steps_done();
         let prior = self.prior(&veni, 0)?;
         // validation panoramas first: they say more
-        let items: Vec<_> = self.splits.val.items().iter().chain(self.splits.train.items()).take(PREVIEW_ROWS).collect();
+        let items: Vec<_> =
+            self.splits.val.items().iter().chain(self.splits.train.items()).take(PREVIEW_ROWS).collect();
         let grid = self.splits.train.grid();
         let images: Vec<_> = items.iter().map(|i| i.log_radiance.as_slice()).collect();
         let latents: Vec<_> = veni.encode(grid, &images)?.into_iter().map(|e| e.vectors).collect();

@@ -166,13 +166,17 @@ fn gradients_of_the_whole_loss_match_finite_differences() {
             let moved = weights::write(veni.clone(), "", &moved).unwrap();
             f64::from(value(&moved).into_scalar::<f32>())
         };
-        // Richardson's combination of two central differences: an error of order h⁴
-        let h = 2e-3;
-        let difference = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
-        // the loss of about 3 is rounded to 3e-7, which 8/(12 h) makes 1e-4; ReLUs add kinks
-        let allowed = 1e-3 + 0.02 * slope.abs();
-        assert!((difference - slope).abs() < allowed, "{name}: difference {difference}, gradient {slope}");
+        // Richardson's combination of two central differences has an error of order h⁴; where a ReLU switches
+        // within the step it has one of order h. One of the steps must agree.
+        let difference = |h: f64| (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+        let differences = [2e-3, 5e-4, 1e-4].map(difference);
+        let error = differences.iter().map(|d| (d - slope).abs()).fold(f64::INFINITY, f64::min);
+        assert!(error < 1e-3 + 0.02 * slope.abs(), "{name}: differences {differences:?}, gradient {slope}");
         checked += usize::from(slope.abs() > 1e-2);
     }
-    assert!(checked > gradients.len() / 2, "only {checked} of {} slopes rise above the noise", gradients.len());
+    assert!(
+        checked > gradients.len() / 2,
+        "only {checked} of {} slopes rise above the noise",
+        gradients.len()
+    );
 }

@@ -41,7 +41,8 @@ impl Veni {
     pub fn new(config: &ModelConfig, rng: &mut impl Rng, device: &Device) -> Result<Self> {
         config.validate()?;
         let encoder = config.encoder.as_ref();
-        let encoder = encoder.ok_or_else(|| Error::invalid("the model has no encoder: it can only decode"))?;
+        let encoder =
+            encoder.ok_or_else(|| Error::invalid("the model has no encoder: it can only decode"))?;
         let decoder = Decoder::new(&config.decoder, config.latent_vectors, rng, device);
         Ok(Self { encoder: Encoder::new(encoder, config.latent_vectors, rng, device)?, decoder })
     }
@@ -97,7 +98,8 @@ impl Veni {
         let directions = Tensor::<3>::from_data(TensorData::new(directions, size), &device);
         let mut out = Vec::with_capacity(images.len());
         for chunk in images.chunks(CHUNK) {
-            let samples: Vec<f32> = chunk.iter().flat_map(|image| gather.sample(image.as_chunks().0)).flatten().collect();
+            let samples: Vec<f32> =
+                chunk.iter().flat_map(|image| gather.sample(image.as_chunks().0)).flatten().collect();
             let samples = TensorData::new(samples, [chunk.len(), size[0], size[1], 3]);
             let posterior = self.encoder.forward(directions.clone(), Tensor::from_data(samples, &device));
             let n = self.latent_vectors();
