@@ -22,9 +22,9 @@ pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
         return Some(Elsewhere(double::elsewhere(case, device)));
     }
     if case.expects("in.latent0") {
-        helper(case, device)
+        helper(case, device);
     } else {
-        evaluation(case, device)
+        evaluation(case, device);
     }
     Some(Compared)
 }

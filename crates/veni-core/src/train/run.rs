@@ -158,7 +158,8 @@ impl Trainer {
         let batches = Batches::new(&self.config, self.veni.stripes()?, &splits.train);
         let finish = std::thread::scope(|scope| {
             let (send, receive) = mpsc::sync_channel(AHEAD);
-            scope.spawn(move || (first..=total).try_for_each(|step| send.send(batches.prepare(step))));
+            // ends early when nobody receives any more
+            scope.spawn(move || (first..=total).all(|step| send.send(batches.prepare(step)).is_ok()));
             // `receive` is moved in, so that whatever ends the loop also ends the thread
             self.updates(receive, stop, progress, &mut log)
         })?;

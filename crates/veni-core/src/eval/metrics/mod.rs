@@ -27,7 +27,7 @@ pub struct Scores {
     pub ssim_ldr: f64,
 }
 
-/// Compares two images of log radiance, [height][width][3].
+/// Compares two images of log radiance, `[height, width, 3]`.
 ///
 /// The prediction is aligned first and both are exponentiated; display values are those of [`srgb_q98`],
 /// each image under its own white. No solid-angle weights, as in the papers.

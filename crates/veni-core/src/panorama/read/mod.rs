@@ -70,11 +70,11 @@ impl Panorama {
     /// - OpenEXR: every compression and sample type of the `exr` crate, scan lines or tiles, the largest level
     ///   of multi-resolution files. The panorama is the display window; where the data window leaves some of it
     ///   uncovered the pixels are black, as OpenEXR defines, and what lies outside is cut off. Colour channels
-    ///   are R, G, B or, failing that, Y alone as grey; alpha is ignored. A factor that [`HalfRange::Scale`]
+    ///   are R, G, B or, failing that, Y alone as grey; alpha is ignored. A factor that [`HalfRange::Fit`]
     ///   recorded in the file is divided out again.
     /// - Radiance: values are divided by the product of the EXPOSURE lines, as that format asks.
     ///
-    /// [`HalfRange::Scale`]: super::HalfRange::Scale
+    /// [`HalfRange::Fit`]: super::HalfRange::Fit
     ///
     /// # Errors
     /// [`Error::Unsupported`] for formats with a limited range (PNG, JPEG, …), cube maps, deep, subsampled or

@@ -4,7 +4,7 @@ use burn::tensor::Tensor;
 
 /// 1 − average over the sphere of cos(e^P, e^I), the angle between linear RGB vectors: the chromaticity
 /// error, blind to any brightness factor, even one per pixel. This is what the paper describes; it takes
-/// the cosine of *log* RGB, as [`reference`] does, which is neither. [B, H, W, 3] → [1].
+/// the cosine of *log* RGB, as [`reference()`] does, which is neither. `[B, H, W, 3]` → `[1]`.
 pub fn chromaticity(prediction: Tensor<4>, target: Tensor<4>, weights: Tensor<4>) -> Tensor<1> {
     let (p, i) = (linear(prediction), linear(target));
     let product = (p.clone() * i.clone()).sum_dim(3);
@@ -19,12 +19,12 @@ fn linear(log_radiance: Tensor<4>) -> Tensor<4> {
 }
 
 /// The authors' form: mean over pixels of 1 − mask·cos(P, I) of the log values, ε = 1e-8 on the product of
-/// the lengths. [B, H, W, 3] → [1].
+/// the lengths. `[B, H, W, 3]` → `[1]`.
 pub fn reference(prediction: Tensor<4>, target: Tensor<4>, mask: Tensor<4>) -> Tensor<1> {
     ((cosine(prediction, target) * mask).neg() + 1.0).mean()
 }
 
-/// RENI++'s form: mean over rays of 1 − cos(P, I) of the log values. [.., 3] → [1].
+/// RENI++'s form: mean over rays of 1 − cos(P, I) of the log values. [.., 3] → `[1]`.
 pub fn rays<const D: usize>(prediction: Tensor<D>, target: Tensor<D>) -> Tensor<1> {
     (cosine(prediction, target).neg() + 1.0).mean()
 }

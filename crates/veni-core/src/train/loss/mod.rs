@@ -1,6 +1,6 @@
 //! The training loss: a weighted sum of terms, each with its schedule.
 //!
-//! Images are log radiance [B, H, W, 3], row 0 on top. Every term exists in two forms. The corrected one,
+//! Images are log radiance `[B, H, W, 3]`, row 0 on top. Every term exists in two forms. The corrected one,
 //! the default, does what the paper describes and is what its name says; the reference form reproduces
 //! the authors' program number for number. Where they differ is said at each term.
 
@@ -90,7 +90,7 @@ impl LossConfig {
 pub struct Term {
     /// The name of its weight in [`LossConfig`].
     pub name: &'static str,
-    /// The weighted value, [1].
+    /// The weighted value, `[1]`.
     pub value: Tensor<1>,
 }
 
@@ -102,7 +102,7 @@ pub struct LossTerms {
 }
 
 impl LossTerms {
-    /// Their sum, [1].
+    /// Their sum, `[1]`.
     ///
     /// # Panics
     /// If every weight is 0.
@@ -140,8 +140,8 @@ impl Loss {
         Self { config: config.clone(), rows, mage }
     }
 
-    /// All terms whose weight in `step` is not 0. Images [B, H, W, 3]; `posterior` is the encoder's
-    /// (mean [B, N, 3], log variance [B, N, 1]), absent for an auto-decoder or in evaluation.
+    /// All terms whose weight in `step` is not 0. Images `[B, H, W, 3]`; `posterior` is the encoder's
+    /// (mean `[B, N, 3]`, log variance `[B, N, 1]`), absent for an auto-decoder or in evaluation.
     pub fn terms(
         &self,
         step: u64,

@@ -12,15 +12,15 @@ pub enum Space {
     Log,
     /// Linear radiance.
     Hdr,
-    /// Display values: divided by the target's 98 % quantile, clamped to [0, 1], sRGB curve.
+    /// Display values: divided by the target's 98 % quantile, clamped to `[0, 1]`, sRGB curve.
     Ldr,
 }
 
-/// The mean squared error. `rows` are weights per row ([1, H, 1, 1]), `mask` [1 or B, H, W, 1] says how
+/// The mean squared error. `rows` are weights per row (`[1, H, 1, 1]`), `mask` `[1 or B, H, W, 1]` says how
 /// much each pixel counts (1 everywhere where absent).
 ///
 /// Corrected: Σ w d²/Σ w, w = rows × mask. Reference: mean((w d)²), the weight inside the square and not
-/// divided out; and the authors' "LDR" error is computed in log space. [B, H, W, 3] → [1].
+/// divided out; and the authors' "LDR" error is computed in log space. `[B, H, W, 3]` → `[1]`.
 pub fn mse(
     form: LossForm,
     space: Space,
@@ -55,7 +55,7 @@ pub fn mse(
     }
 }
 
-/// The log of each target's 98 % quantile over all its values, [B, 1, 1, 1]; a constant.
+/// The log of each target's 98 % quantile over all its values, `[B, 1, 1, 1]`; a constant.
 fn white_point(target: &Tensor<4>) -> Tensor<4> {
     let [batch, height, width, channels] = target.dims();
     let flat = target.clone().detach().reshape([batch, height * width * channels]);
@@ -67,7 +67,7 @@ fn white_point(target: &Tensor<4>) -> Tensor<4> {
     (value(below) * (1.0 - part) + value(below + 1) * part).log().reshape([batch, 1, 1, 1])
 }
 
-/// e^(x − white) clamped to [0, 1], through the sRGB curve.
+/// e^(x − white) clamped to `[0, 1]`, through the sRGB curve.
 fn display(log_radiance: Tensor<4>, white: Tensor<4>) -> Tensor<4> {
     let x = (log_radiance - white).clamp_max(0.0).exp();
     let linear = x.clone() * 12.92;
@@ -78,7 +78,7 @@ fn display(log_radiance: Tensor<4>, white: Tensor<4>) -> Tensor<4> {
 
 /// Only the brightest part of each target: the mean squared log error over the values of an image that are
 /// among its ⌊`fraction` · count⌋ largest. The authors divide by the number of all values instead.
-/// [B, ..] → [1].
+/// `[B, ..]` → `[1]`.
 ///
 /// # Panics
 /// If that is not a single value.

@@ -22,13 +22,13 @@ use rand::Rng;
 /// directional input.
 #[derive(Module, Debug)]
 pub struct Condition {
-    /// s, [1].
+    /// s, `[1]`.
     pub scale: Param<Tensor<1>>,
-    /// a₀, [1, 2].
+    /// a₀, `[1, 2]`.
     pub linear: Param<Tensor<2>>,
-    /// W, [in 2, out 2].
+    /// W, `[in 2, out 2]`.
     pub w: Param<Tensor<2>>,
-    /// U, [in 2, out 2].
+    /// U, `[in 2, out 2]`.
     pub u: Param<Tensor<2>>,
     #[module(skip)]
     form: VnReluForm,
@@ -64,7 +64,7 @@ impl Condition {
         }
     }
 
-    /// Latents [B, N, 3] → conditioning [B, 3N]: (a_0, a_1, z_z) of each vector, one after the other.
+    /// Latents `[B, N, 3]` → conditioning `[B, 3N]`: (a_0, a_1, z_z) of each vector, one after the other.
     pub fn forward(&self, latent: Tensor<3>) -> Tensor<2> {
         let [batch, n, _] = latent.dims();
         let xy = latent.clone().narrow(2, 0, 2);
@@ -83,7 +83,7 @@ impl Condition {
     }
 }
 
-/// m/√max(m, g) with m = β² t: the length |k|, guarded from below. [1, 1, 2] and [B, N, 1] → [B, N, 2].
+/// m/√max(m, g) with m = β² t: the length |k|, guarded from below. `[1, 1, 2]` and `[B, N, 1]` → `[B, N, 2]`.
 fn length(beta: Tensor<3>, t: Tensor<3>, guard: f64) -> Tensor<3> {
     let m = beta.clone() * beta * t;
     m.clone() / m.clamp_min(guard).sqrt()

@@ -8,7 +8,7 @@ use rand::Rng;
 /// Added to the variance before its square root.
 const EPSILON: f64 = 1e-5;
 
-/// Gain and offset of a layer norm, each [h].
+/// Gain and offset of a layer norm, each `[h]`.
 #[derive(Module, Debug)]
 pub struct Norm {
     /// γ.
@@ -41,15 +41,15 @@ impl Norm {
 /// one vector per image. Its query and key weights never act and do not exist here.
 #[derive(Module, Debug)]
 pub struct Layer {
-    /// The attention's value projection, [3N, h].
+    /// The attention's value projection, `[3N, h]`.
     pub value: Linear,
-    /// The attention's output projection, [h, h].
+    /// The attention's output projection, `[h, h]`.
     pub out: Linear,
     /// The norm after the attention.
     pub norm1: Norm,
-    /// First feed-forward map, [h, h].
+    /// First feed-forward map, `[h, h]`.
     pub ff1: Linear,
-    /// Second feed-forward map, [h, h].
+    /// Second feed-forward map, `[h, h]`.
     pub ff2: Linear,
     /// The norm after the feed-forward.
     pub norm2: Norm,
@@ -68,12 +68,12 @@ impl Layer {
         }
     }
 
-    /// The attention output, once per image: conditioning [B, 3N] → [B, h].
+    /// The attention output, once per image: conditioning `[B, 3N]` → `[B, h]`.
     pub fn attention(&self, condition: Tensor<2>) -> Tensor<2> {
         self.out.forward(self.value.forward(condition))
     }
 
-    /// x + att [B, R, h] → x̂ [B, R, h], whose γ₂ x̂ + β₂ is the layer's output.
+    /// x + att `[B, R, h]` → x̂ `[B, R, h]`, whose γ₂ x̂ + β₂ is the layer's output.
     pub(super) fn forward(&self, x: Tensor<3>) -> Tensor<3> {
         let x = normalise(x);
         let (weight, bias) = self.norm1.fold(&self.ff1);
@@ -84,7 +84,7 @@ impl Layer {
         normalise(branch + x * self.norm1.gamma.val().unsqueeze())
     }
 
-    /// The input of the layer after this one: γ₂ x̂ + (β₂ + that layer's attention output [B, h]).
+    /// The input of the layer after this one: γ₂ x̂ + (β₂ + that layer's attention output `[B, h]`).
     pub(super) fn next_input(&self, x: Tensor<3>, attention: Tensor<2>) -> Tensor<3> {
         let offset = attention + self.norm2.beta.val().unsqueeze();
         x * self.norm2.gamma.val().unsqueeze() + offset.unsqueeze_dim(1)

@@ -4,12 +4,12 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData, module};
 use rand::{Rng, RngExt};
 
-/// y = x W + b on row vectors: weight [in, out], bias [out].
+/// y = x W + b on row vectors: weight `[in, out]`, bias `[out]`.
 #[derive(Module, Debug)]
 pub struct Linear {
     /// W, [in, out].
     pub weight: Param<Tensor<2>>,
-    /// b, [out].
+    /// b, `[out]`.
     pub bias: Param<Tensor<1>>,
 }
 
