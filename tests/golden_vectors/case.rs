@@ -81,6 +81,7 @@ pub(crate) struct Case {
     pub(crate) tensors: BTreeMap<String, Data>,
     compared: RefCell<BTreeSet<String>>,
     failures: RefCell<Vec<String>>,
+    ratios: RefCell<Vec<(f64, String)>>,
 }
 
 impl Case {
@@ -104,6 +105,7 @@ impl Case {
             tensors: tensors.collect::<Result<_, String>>()?,
             compared: RefCell::default(),
             failures: RefCell::default(),
+            ratios: RefCell::default(),
         })
     }
 
@@ -118,6 +120,7 @@ impl Case {
             tensors: self.tensors.clone(),
             compared: RefCell::default(),
             failures: RefCell::default(),
+            ratios: RefCell::default(),
         }
     }
 
@@ -198,9 +201,16 @@ impl Case {
     pub(crate) fn compare_within(&self, name: &str, ours: &Data, deviation: f64) {
         let golden = self.data(name);
         self.compared.borrow_mut().insert(name.to_owned());
+<<<<<<< HEAD
         let rule = self.tolerances.get(name).copied().unwrap_or(Tolerance::UNKNOWN);
         if let Err(message) = compare::check(ours, golden, rule.at_least(deviation)) {
             self.failures.borrow_mut().push(format!("{name}: {message}"));
+=======
+        let tolerance = self.tolerances.get(name).copied().unwrap_or(Tolerance::UNKNOWN);
+        match compare::check(ours, golden, tolerance) {
+            Ok(ratio) => self.ratios.borrow_mut().push((ratio, name.to_owned())),
+            Err(message) => self.failures.borrow_mut().push(format!("{name}: {message}")),
+>>>>>>> decoder
         }
     }
 
@@ -227,6 +237,11 @@ impl Case {
     /// How many tensors were compared.
     pub(crate) fn comparisons(&self) -> usize {
         self.compared.borrow().len()
+    }
+
+    /// The tensors within the tolerance and how much of it they use, 0 to 1.
+    pub(crate) fn ratios(&self) -> Vec<(f64, String)> {
+        self.ratios.borrow().clone()
     }
 
     /// What failed so far, and every output or gradient of the file that nobody compared.

@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// What became of one case.
 #[derive(Debug)]
 pub(crate) enum Verdict {
-    /// Number of tensors compared.
-    Passed(usize),
+    /// The tensors compared, and how much of its tolerance each uses.
+    Passed(Vec<(f64, String)>),
     /// The reason.
     Skipped(String),
     /// One message per failing tensor.
@@ -29,7 +29,7 @@ pub(crate) fn run_case(case: &Case, device: &Device) -> Verdict {
         Ok(Some(Outcome::Compared)) => match (case.failures(), case.comparisons()) {
             (failures, _) if !failures.is_empty() => Verdict::Failed(failures),
             (_, 0) => Verdict::Failed(vec!["nothing was compared".into()]),
-            (_, count) => Verdict::Passed(count),
+            (..) => Verdict::Passed(case.ratios()),
         },
         Err(panic) => {
             let text = panic.downcast_ref::<String>().cloned();
@@ -80,10 +80,22 @@ pub(crate) fn run_folder(label: &str, folder: &Path, device: &Device) {
 
 /// Prints past the test framework's capture, so that the counts of a green run are seen too.
 fn summarise(label: &str, results: &[(String, Verdict)]) {
-    let (mut text, mut counts, mut tensors) = (String::new(), [0usize; 3], 0);
+    let (mut text, mut counts, mut tensors, mut closest) =
+        (String::new(), [0usize; 3], 0, (0.0, String::new()));
+    let verbose = std::env::var_os("VENI_GOLDEN_VERBOSE").is_some();
     for (name, verdict) in results {
         match verdict {
-            Verdict::Passed(compared) => (counts[0], tensors) = (counts[0] + 1, tensors + compared),
+            Verdict::Passed(ratios) => {
+                (counts[0], tensors) = (counts[0] + 1, tensors + ratios.len());
+                for (ratio, tensor) in ratios {
+                    if verbose {
+                        text += &format!("  {ratio:.4} of the tolerance: {name}: {tensor}\n");
+                    }
+                    if *ratio > closest.0 {
+                        closest = (*ratio, format!("{name}: {tensor}"));
+                    }
+                }
+            }
             Verdict::Skipped(reason) => {
                 counts[1] += 1;
                 text += &format!("  skipped {name}: {reason}\n");
@@ -95,8 +107,11 @@ fn summarise(label: &str, results: &[(String, Verdict)]) {
         }
     }
     let [passed, skipped, failed] = counts;
-    let head =
-        format!("golden on {label}: {passed} passed ({tensors} tensors), {skipped} skipped, {failed} failed");
+    let head = format!(
+        "golden on {label}: {passed} passed ({tensors} tensors), {skipped} skipped, {failed} failed; \
+         the closest uses {:.2} of its tolerance ({})",
+        closest.0, closest.1
+    );
     let _ = std::io::stderr().write_all(format!("\n{head}\n{text}").as_bytes());
     assert!(failed == 0, "{head}\n{text}");
     assert!(passed > 0, "{head}: not one case was computed");
