@@ -201,16 +201,10 @@ impl Case {
     pub(crate) fn compare_within(&self, name: &str, ours: &Data, deviation: f64) {
         let golden = self.data(name);
         self.compared.borrow_mut().insert(name.to_owned());
-<<<<<<< HEAD
-        let rule = self.tolerances.get(name).copied().unwrap_or(Tolerance::UNKNOWN);
-        if let Err(message) = compare::check(ours, golden, rule.at_least(deviation)) {
-            self.failures.borrow_mut().push(format!("{name}: {message}"));
-=======
         let tolerance = self.tolerances.get(name).copied().unwrap_or(Tolerance::UNKNOWN);
-        match compare::check(ours, golden, tolerance) {
+        match compare::check(ours, golden, tolerance.at_least(deviation)) {
             Ok(ratio) => self.ratios.borrow_mut().push((ratio, name.to_owned())),
             Err(message) => self.failures.borrow_mut().push(format!("{name}: {message}")),
->>>>>>> decoder
         }
     }
 

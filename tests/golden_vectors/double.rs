@@ -40,8 +40,8 @@ pub(crate) fn elsewhere(case: &Case, device: &Device) -> Verdict {
         .expect("this program starts again");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let verdict = text.lines().find_map(|line| line.split_once(MARK)).map(|(_, verdict)| verdict);
-    match verdict.and_then(|v| serde_json::from_str::<(usize, Vec<String>)>(v).ok()) {
-        Some((count, failures)) if failures.is_empty() => Verdict::Passed(count),
+    match verdict.and_then(|v| serde_json::from_str::<(Vec<(f64, String)>, Vec<String>)>(v).ok()) {
+        Some((ratios, failures)) if failures.is_empty() => Verdict::Passed(ratios),
         Some((_, failures)) => Verdict::Failed(failures),
         None => Verdict::Failed(vec![format!("no verdict from the f64 process: {text}")]),
     }
@@ -60,9 +60,9 @@ fn one_case_in_double_precision() {
     device.configure(FloatDType::F64).expect("the device computes in f64");
     let case = Case::load(Path::new(&path)).expect("a readable case");
     let verdict = match run_case(&case, &device.autodiff()) {
-        Verdict::Passed(count) => (count, Vec::new()),
-        Verdict::Failed(failures) => (0, failures),
-        Verdict::Skipped(reason) => (0, vec![format!("skipped in f64: {reason}")]),
+        Verdict::Passed(ratios) => (ratios, Vec::new()),
+        Verdict::Failed(failures) => (Vec::new(), failures),
+        Verdict::Skipped(reason) => (Vec::new(), vec![format!("skipped in f64: {reason}")]),
     };
     let verdict = serde_json::to_string(&verdict).expect("numbers and text");
     // the harness reads it from the output of this process
