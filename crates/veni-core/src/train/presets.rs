@@ -93,8 +93,8 @@ fn small(latent_vectors: usize) -> TrainConfig {
         augment: varied(),
         loss_grid: LossGrid::Strided { factor: 2 },
         // The gradient term is lighter than the paper's: 27 numbers cannot follow edges. What a viewer sees
-        // (clamped, tonemapped) is asked for directly, and the colour of the logarithm, which has no meaning
-        // near radiance 1, hardly counts. The divergence weighs double: overfitting is the enemy.
+        // (clamped, tonemapped) is asked for directly, which covers most of the colour too. The divergence weighs
+        // double: overfitting is the enemy.
         loss: LossConfig {
             mage: WeightSchedule::Constant(0.1),
             cosine: WeightSchedule::Constant(0.1),
