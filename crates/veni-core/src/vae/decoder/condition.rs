@@ -1,7 +1,7 @@
 //! What the network is told about the latent apart from its products with the direction.
 
-use super::linear::uniform;
 use crate::model::VnReluForm;
+use crate::nn::uniform;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;

@@ -1,8 +1,9 @@
 //! An affine map on the last axis, initialised from our own random numbers.
 
+use crate::nn::uniform;
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor, TensorData, module};
-use rand::{Rng, RngExt};
+use burn::tensor::{Device, Tensor, module};
+use rand::Rng;
 
 /// y = x W + b on row vectors: weight `[in, out]`, bias `[out]`.
 #[derive(Module, Debug)]
@@ -16,7 +17,7 @@ pub struct Linear {
 impl Linear {
     /// Weight and bias uniform in ±1/√inputs.
     pub fn new(inputs: usize, outputs: usize, rng: &mut impl Rng, device: &Device) -> Self {
-        let bound = 1.0 / (inputs as f32).sqrt();
+        let bound = 1.0 / (inputs as f64).sqrt();
         Self {
             weight: uniform([inputs, outputs], bound, rng, device),
             bias: uniform([outputs], bound, rng, device),
@@ -27,16 +28,4 @@ impl Linear {
     pub fn forward<const D: usize>(&self, x: Tensor<D>) -> Tensor<D> {
         module::linear(x, self.weight.val(), Some(self.bias.val()))
     }
-}
-
-/// A parameter with independent uniform values in [−bound, bound).
-pub(super) fn uniform<const D: usize>(
-    shape: [usize; D],
-    bound: f32,
-    rng: &mut impl Rng,
-    device: &Device,
-) -> Param<Tensor<D>> {
-    let count = shape.iter().product();
-    let values: Vec<f32> = (0..count).map(|_| rng.random_range(-bound..bound)).collect();
-    Param::from_data(TensorData::new(values, shape), device)
 }
