@@ -83,7 +83,7 @@ pub(crate) fn writable(folder: &Path, wanted: &Path) -> Result<()> {
 /// Adds what to do to an error of the system while writing.
 pub(crate) fn with_remedy(error: Error) -> anyhow::Error {
     let remedy = match &error {
-        Error::Io { action: "write", source, .. } => match source.kind() {
+        Error::Io { action: "write", cause, .. } => match cause.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
                 "free some space or name another disk"
             }

@@ -13,14 +13,14 @@ pub enum Error {
     #[error("{0}")]
     Unsupported(String),
     /// The operating system refused.
-    #[error("{}: cannot {action}: {source}", path.display())]
+    #[error("{}: cannot {action}: {cause}", path.display())]
     Io {
         /// The file or folder concerned.
         path: PathBuf,
         /// What was being done, as an infinitive without "to" ("read", "create").
         action: &'static str,
-        /// The system's own word.
-        source: std::io::Error,
+        /// The system's own word. It is part of the message, so it is no `source` beside it.
+        cause: std::io::Error,
     },
 }
 
@@ -39,8 +39,8 @@ impl Error {
     }
 
     /// An [`Error::Io`] for `path`, e.g. `.map_err(|e| Error::io(path, "read", e))`.
-    pub fn io(path: impl AsRef<Path>, action: &'static str, source: std::io::Error) -> Self {
-        Self::Io { path: path.as_ref().to_path_buf(), action, source }
+    pub fn io(path: impl AsRef<Path>, action: &'static str, cause: std::io::Error) -> Self {
+        Self::Io { path: path.as_ref().to_path_buf(), action, cause }
     }
 
     /// The same error with `path: ` put before an invalid or unsupported message that lacks it.

@@ -54,7 +54,7 @@ fn varied() -> AugmentConfig {
         polar_warp: 0.4,
         recombine: 0.4,
         recombine_blend: 4.0,
-        mix: 0.4,
+        mix: 0.3,
         mix_share: 0.5,
     }
 }
