@@ -4,6 +4,8 @@ pub mod decoder;
 pub mod encoder;
 pub mod posterior;
 pub mod veni;
+#[cfg(test)]
+mod veni_tests;
 pub mod weights;
 
 pub use decoder::Decoder;
