@@ -1,4 +1,34 @@
-//! The VENI decoder on the GPU.
+//! The VENI decoder on the GPU, inside the host's own frame.
 //!
-//! Nothing yet: the crate holds its place in the workspace, and the rule that it may know the lighting world of
-//! `veni-core` only. Until the WGSL stages stand, bake on the CPU (`veni_core::field`) and upload the panorama.
+//! A [`GpuDecoder`](decoder::GpuDecoder) holds a model's weights on the host's `wgpu::Device`.
+//! [`condition`](decoder::GpuDecoder::condition) folds a latent on the CPU and uploads a few kilobytes;
+//! [`bake`](decoder::GpuDecoder::bake) records a compute pass into the host's command encoder: a panorama, cube
+//! faces, or radiances for a buffer of directions. Nothing here creates an instance, submits, or installs an error
+//! handler, except the conveniences in [`read_back`] and [`adapters`], which say so.
+//!
+//! [`shader`] has no wgpu types: WGSL text, sizes, binding layouts and packed weights for any API, and the function
+//! `veni_radiance` to paste into a path tracer. It is all that is left without the feature `wgpu`.
+//!
+//! This crate belongs to the lighting world: it must not depend on burn (checked by `scripts/check-worlds.sh`).
+
+pub mod shader;
+
+#[cfg(feature = "wgpu")]
+pub mod adapters;
+#[cfg(feature = "wgpu")]
+pub mod decoder;
+#[cfg(feature = "wgpu")]
+pub mod error;
+#[cfg(feature = "wgpu")]
+pub mod probe;
+#[cfg(feature = "wgpu")]
+pub mod read_back;
+#[cfg(feature = "wgpu")]
+mod scope;
+
+#[cfg(feature = "wgpu")]
+pub use decoder::{Bake, GpuDecoder, GpuLatents};
+#[cfg(feature = "wgpu")]
+pub use error::{Error, Result};
+#[cfg(feature = "wgpu")]
+pub use wgpu;

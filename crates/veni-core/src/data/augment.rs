@@ -36,6 +36,14 @@ pub struct AugmentConfig {
     pub recombine: f64,
     /// Half width of the blend at the horizon when recombining, degrees.
     pub recombine_blend: f64,
+    /// Largest amplitude, in [0, 1), of the monotone warp φ → φ + a·sin(φ − φ₀): one side of the scene is
+    /// drawn together and the opposite one spread.
+    pub azimuth_warp: f64,
+    /// Probability of taking one side of the scene from a second panorama.
+    pub join: f64,
+    /// Width of the blend between the two sides when joining, as a share of the distance from side to side, in
+    /// (0, 1].
+    pub join_blend: f64,
     /// Probability of adding a second panorama's light: a convex combination in linear radiance.
     pub mix: f64,
     /// Largest share of the second panorama in a mix, in (0, 1].
@@ -57,6 +65,9 @@ impl AugmentConfig {
             ("polar_warp", self.polar_warp, 0.99),
             ("recombine", self.recombine, 1.0),
             ("recombine_blend", self.recombine_blend, 90.0),
+            ("azimuth_warp", self.azimuth_warp, 0.99),
+            ("join", self.join, 1.0),
+            ("join_blend", self.join_blend, 1.0),
             ("mix", self.mix, 1.0),
             ("mix_share", self.mix_share, 1.0),
         ];
@@ -87,6 +98,12 @@ impl AugmentConfig {
             recombine(grid, &mut out, &second, self.recombine_blend.to_radians());
             touched = true;
         }
+        if happens(rng, self.join) {
+            let second = self.oriented(grid, other(rng), rng, true);
+            let bearing = std::f64::consts::TAU * uniform(rng);
+            join(grid, &mut out, &second, bearing, 0.5 * signed(rng), self.join_blend);
+            touched = true;
+        }
         if happens(rng, self.mix) {
             let second = self.oriented(grid, other(rng), rng, true);
             mix(&mut out, &second, self.mix_share * uniform(rng));
@@ -95,6 +112,11 @@ impl AugmentConfig {
         out = self.oriented(grid, &out, rng, false);
         if self.polar_warp > 0.0 {
             out = polar_warp(grid, &out, self.polar_warp * signed(rng));
+            touched = true;
+        }
+        if self.azimuth_warp > 0.0 {
+            let bearing = std::f64::consts::TAU * uniform(rng);
+            out = azimuth_warp(grid, &out, self.azimuth_warp * signed(rng), bearing);
             touched = true;
         }
         if self.contrast > 0.0 {
@@ -175,6 +197,56 @@ pub fn polar_warp(grid: Equirect, image: &[f32], amplitude: f64) -> Vec<f32> {
     out
 }
 
+/// Moves content along parallels: the new column at azimuth φ shows what was at φ + amplitude·sin(φ − bearing).
+/// For |amplitude| < 1 the map is monotone and goes round once. Linear interpolation of log radiance between
+/// columns, wrapped at the seam.
+pub fn azimuth_warp(grid: Equirect, image: &[f32], amplitude: f64, bearing: f64) -> Vec<f32> {
+    let width = grid.width;
+    let columns: Vec<_> = (0..width)
+        .map(|i| {
+            let azimuth = grid.azimuth(i);
+            let source = azimuth + amplitude * (azimuth - bearing).sin();
+            let position = (0.5 - source / std::f64::consts::TAU) * width as f64 - 0.5;
+            let low = position.floor();
+            let wrap = |x: f64| x.rem_euclid(width as f64) as usize % width;
+            (3 * wrap(low), 3 * wrap(low + 1.0), (position - low) as f32)
+        })
+        .collect();
+    let mut out = Vec::with_capacity(image.len());
+    for row in image.chunks_exact(3 * width) {
+        for &(low, high, t) in &columns {
+            out.extend((0..3).map(|c| row[low + c] + t * (row[high + c] - row[low + c])));
+        }
+    }
+    out
+}
+
+/// Replaces the side of `image` towards azimuth `bearing` by that of `second`. With e the horizontal axis at
+/// that bearing, the share of `second` rises smoothly with ⟨d, e⟩ from 0 to 1 around `offset`, over `blend`
+/// times the range −1 to 1 (in log radiance). A function of the direction alone, it has no seam at the poles.
+pub fn join(grid: Equirect, image: &mut [f32], second: &[f32], bearing: f64, offset: f64, blend: f64) {
+    let cosines: Vec<_> = (0..grid.width).map(|i| (grid.azimuth(i) - bearing).cos()).collect();
+    let stride = 3 * grid.width;
+    let rows = image.chunks_exact_mut(stride).zip(second.chunks_exact(stride));
+    for (j, (row, second)) in rows.enumerate() {
+        let sin = grid.polar(j).sin();
+        let pixels = row.chunks_exact_mut(3).zip(second.chunks_exact(3));
+        for ((pixel, second), cosine) in pixels.zip(&cosines) {
+            let t = smooth_step(sin * cosine - offset, blend);
+            pixel.iter_mut().zip(second).for_each(|(v, s)| *v += t * (s - *v));
+        }
+    }
+}
+
+/// 0 below −half_width, 1 above it, 3t² − 2t³ between; a step if the width is 0.
+fn smooth_step(x: f64, half_width: f64) -> f32 {
+    if half_width <= 0.0 {
+        return f32::from(x > 0.0);
+    }
+    let t = (0.5 + 0.5 * x / half_width).clamp(0.0, 1.0);
+    (t * t * (3.0 - 2.0 * t)) as f32
+}
+
 /// Replaces the lower hemisphere of `image` by that of `ground`, blended over ± `half_width` radians about
 /// the horizon with a smooth step (in log radiance).
 pub fn recombine(grid: Equirect, image: &mut [f32], ground: &[f32], half_width: f64) {
@@ -182,12 +254,7 @@ pub fn recombine(grid: Equirect, image: &mut [f32], ground: &[f32], half_width: 
     let rows = image.chunks_exact_mut(stride).zip(ground.chunks_exact(stride));
     for (j, (sky, ground)) in rows.enumerate() {
         let below = grid.polar(j) - std::f64::consts::FRAC_PI_2;
-        let t = if half_width > 0.0 {
-            let t = (0.5 + 0.5 * below / half_width).clamp(0.0, 1.0);
-            (t * t * (3.0 - 2.0 * t)) as f32
-        } else {
-            f32::from(below > 0.0)
-        };
+        let t = smooth_step(below, half_width);
         sky.iter_mut().zip(ground).for_each(|(s, g)| *s += t * (g - *s));
     }
 }
@@ -236,6 +303,9 @@ mod tests {
             polar_warp: 0.5,
             recombine: 0.7,
             recombine_blend: 10.0,
+            azimuth_warp: 0.5,
+            join: 0.7,
+            join_blend: 0.5,
             mix: 0.7,
             mix_share: 0.5,
         }
@@ -297,6 +367,45 @@ mod tests {
             assert!((f64::from(column[2]) - expected).abs() < 1e-5);
         }
         assert_eq!(polar_warp(GRID, &ramp, 0.0), ramp);
+    }
+
+    #[test]
+    fn azimuth_warp_goes_round_once_and_turns_with_its_bearing() {
+        let a = image(8);
+        assert_eq!(azimuth_warp(GRID, &a, 0.0, 1.0).len(), a.len());
+        let still = azimuth_warp(GRID, &a, 0.0, 1.0);
+        assert!(still.iter().zip(&a).all(|(x, y)| (x - y).abs() < 1e-5));
+        // the azimuth itself, as a phase: the warped phase must be φ + a sin(φ − φ₀) up to interpolation
+        let grid = Equirect::new(256, 2);
+        let phase: Vec<f32> = (0..grid.len())
+            .flat_map(|p| {
+                let azimuth = grid.azimuth(p % grid.width);
+                [azimuth.cos() as f32, azimuth.sin() as f32, 0.0]
+            })
+            .collect();
+        let out = azimuth_warp(grid, &phase, 0.8, 0.7);
+        for i in 0..grid.width {
+            let azimuth = grid.azimuth(i);
+            let expected = azimuth + 0.8 * (azimuth - 0.7).sin();
+            assert!((f64::from(out[3 * i]) - expected.cos()).abs() < 3e-4);
+            assert!((f64::from(out[3 * i + 1]) - expected.sin()).abs() < 3e-4);
+        }
+    }
+
+    #[test]
+    fn joining_takes_sides_from_their_owners() {
+        let (a, b) = (image(9), image(10));
+        let mut out = a.clone();
+        // towards +x, the middle of the image
+        join(GRID, &mut out, &b, 0.0, 0.0, 0.0);
+        for p in 0..GRID.len() {
+            let front = (4..12).contains(&(p % GRID.width));
+            let owner = if front { &b } else { &a };
+            assert!((0..3).all(|c| (out[3 * p + c] - owner[3 * p + c]).abs() < 1e-6), "pixel {p}");
+        }
+        let mut all = a.clone();
+        join(GRID, &mut all, &b, 0.3, -2.0, 0.5);
+        assert!(all.iter().zip(&b).all(|(x, y)| (x - y).abs() < 1e-6));
     }
 
     #[test]

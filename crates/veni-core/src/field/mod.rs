@@ -57,6 +57,20 @@ struct Folded {
     log_exposure: f32,
 }
 
+/// A conditioned latent as plain numbers, for evaluators other than this module: a shader, for instance. h is the
+/// decoder's hidden size; the vectors may be longer, padded with zeros.
+#[derive(Clone, Copy, Debug)]
+pub struct FoldedLatent<'a> {
+    /// x and y of the N latent vectors.
+    pub vectors: &'a [[f32; 2]],
+    /// Bias of the input projection plus the first layer's attention.
+    pub input_bias: &'a [f32],
+    /// For every layer β of its second norm plus the next layer's attention.
+    pub shifts: &'a [Vec<f32>],
+    /// Added to the network's output.
+    pub log_exposure: f32,
+}
+
 impl Model {
     /// The decoder of this model, packed for evaluation (about a millisecond). Keep it for many latents.
     pub fn decoder(&self) -> Decoder {
@@ -115,6 +129,12 @@ impl Decoder {
 }
 
 impl Field {
+    /// What conditioning left of the latent.
+    pub fn folded(&self) -> FoldedLatent<'_> {
+        let Folded { vectors, input_bias, shift, log_exposure, .. } = &*self.folded;
+        FoldedLatent { vectors, input_bias, shifts: shift, log_exposure: *log_exposure }
+    }
+
     /// The same scene turned by `radians` about z, counter-clockwise seen from above. Exact: it turns the latent,
     /// not the picture.
     #[must_use]

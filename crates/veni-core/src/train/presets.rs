@@ -54,6 +54,9 @@ fn varied() -> AugmentConfig {
         polar_warp: 0.4,
         recombine: 0.4,
         recombine_blend: 4.0,
+        azimuth_warp: 0.0,
+        join: 0.0,
+        join_blend: 0.5,
         mix: 0.3,
         mix_share: 0.5,
     }

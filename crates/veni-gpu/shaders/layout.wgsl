@@ -1,0 +1,53 @@
+// Where things lie in the three buffers. All offsets count vec4s; a row is VENI_COLUMNS of them, one value per
+// hidden feature, padded with zeros to whole groups of eight.
+//
+//   veni_matrices  input rows (five per directional input, inputs padded to whole fours),
+//                  then per layer W1 and W2, one row per input feature
+//   veni_vectors   per layer gamma1, beta1, b1, b2, gamma2; then the three output rows and the output bias
+//   veni_latents   per latent: bias of the input projection with the first layer's attention, per layer beta2
+//                  with the next layer's attention, N x (x, y high parts, x, y low parts), (log exposure, 0, 0, 0)
+//
+// The constants VENI_LATENTS (N), VENI_HIDDEN (h), VENI_LAYERS and VENI_COLUMNS are put in front of this file.
+
+// Directional inputs of the encoding: N inner products, z, and the distance from the axis.
+fn veni_inputs() -> u32 {
+    return VENI_LATENTS + 2u;
+}
+
+fn veni_padded_inputs() -> u32 {
+    return (veni_inputs() + 3u) & ~3u;
+}
+
+// The first row of W1 (part 0) or W2 (part 1) of a layer, in rows.
+fn veni_matrix_row(layer: u32, part: u32) -> u32 {
+    return 5u * veni_padded_inputs() + (2u * layer + part) * 4u * VENI_COLUMNS;
+}
+
+const VENI_GAMMA1: u32 = 0u;
+const VENI_BETA1: u32 = 1u;
+const VENI_BIAS1: u32 = 2u;
+const VENI_BIAS2: u32 = 3u;
+const VENI_GAMMA2: u32 = 4u;
+
+// One of the five vectors of a layer.
+fn veni_vector(layer: u32, which: u32) -> u32 {
+    return (5u * layer + which) * VENI_COLUMNS;
+}
+
+// Row of an output channel; channel 3 is the bias.
+fn veni_output(channel: u32) -> u32 {
+    return (5u * VENI_LAYERS + channel) * VENI_COLUMNS;
+}
+
+fn veni_latent(index: u32) -> u32 {
+    return index * (VENI_COLUMNS * (VENI_LAYERS + 1u) + VENI_LATENTS + 1u);
+}
+
+// The vectors of a latent whose block begins at `latent`.
+fn veni_latent_vectors(latent: u32) -> u32 {
+    return latent + VENI_COLUMNS * (VENI_LAYERS + 1u);
+}
+
+fn veni_log_exposure(latent: u32) -> f32 {
+    return veni_latents[veni_latent_vectors(latent) + VENI_LATENTS].x;
+}

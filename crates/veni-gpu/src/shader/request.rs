@@ -1,0 +1,109 @@
+//! The uniform of a bake: `VeniRequest` in `request.wgsl`.
+
+use veni_core::sphere::Frame;
+
+/// How the directions of a bake are laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grid {
+    /// Latitude and longitude: `width` × `height` pixel centres, row 0 on top, as
+    /// [`Equirect`](veni_core::sphere::Equirect). The frame changes nothing here: pixels stay where they are.
+    Equirect {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// Six square faces, +X −X +Y −Y +Z −Z of the frame, as [`CubeFace`](veni_core::sphere::CubeFace).
+    Cube {
+        /// Texels along an edge.
+        size: u32,
+    },
+    /// As many directions in a buffer, in the frame's coordinates.
+    List {
+        /// Their number.
+        count: u32,
+    },
+}
+
+impl Grid {
+    /// Directions of the whole grid for one latent.
+    pub fn directions(self) -> u64 {
+        match self {
+            Self::Equirect { width, height } => u64::from(width) * u64::from(height),
+            Self::Cube { size } => 6 * u64::from(size) * u64::from(size),
+            Self::List { count } => u64::from(count),
+        }
+    }
+}
+
+/// What one dispatch computes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// The whole grid.
+    pub grid: Grid,
+    /// Coordinates of the directions: of cube faces and lists.
+    pub frame: Frame,
+    /// Turns the scene about z by so many radians, counter-clockwise seen from above.
+    pub turn: f64,
+    /// Added to log radiance.
+    pub log_exposure: f32,
+    /// Largest radiance that is stored; larger values are clamped to it.
+    pub largest: f32,
+    /// Store log radiance instead of radiance.
+    pub logarithm: bool,
+    /// Index of the first direction within the grid.
+    pub first: u32,
+    /// Directions for each latent.
+    pub count: u32,
+    /// First latent of the batch.
+    pub latent: u32,
+    /// First tile of this dispatch.
+    pub tile: u32,
+    /// Row of the target texture where the first direction goes.
+    pub row: u32,
+}
+
+impl Request {
+    /// Bytes of the uniform.
+    pub const BYTES: usize = 80;
+
+    /// The uniform, little endian as WGSL lays it out.
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let (layout, width, height) = match self.grid {
+            Grid::Equirect { width, height } => (0, width, height),
+            Grid::Cube { size } => (1, size, size),
+            Grid::List { .. } => (0, 1, 1),
+        };
+        let [x, y, z] = self.axes();
+        let f = |v: [f32; 3]| v.map(f32::to_bits);
+        let ([a, b, c], [d, e, g], [h, i, j]) = (f(x), f(y), f(z));
+        let words = [
+            [a, b, c, layout],
+            [d, e, g, width],
+            [h, i, j, height],
+            [self.first, self.count, self.latent, self.log_exposure.to_bits()],
+            [self.largest.to_bits(), u32::from(self.logarithm), self.tile, self.row],
+        ];
+        bytemuck::cast(words)
+    }
+
+    /// What the coordinate axes of the directions are in the native frame of the unturned scene.
+    fn axes(&self) -> [[f32; 3]; 3] {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let (sin, cos) = self.turn.sin_cos();
+        let (sin, cos) = (sin as f32, cos as f32);
+        axes.map(|axis| {
+            let axis = match self.grid {
+                Grid::Equirect { .. } => axis,
+                // Bevy's shaders negate z before they look a cube map up
+                Grid::Cube { .. } if self.frame == Frame::Bevy => {
+                    self.frame.to_native([axis[0], axis[1], -axis[2]])
+                }
+                _ => self.frame.to_native(axis),
+            };
+            // turning the scene by α looks up at −α
+            let [x, y, z] = axis;
+            [cos * x + sin * y, cos * y - sin * x, z]
+        })
+    }
+}
