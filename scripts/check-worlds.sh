@@ -11,6 +11,11 @@ for package in "veni-core --no-default-features" "veni-gpu"; do
     fi
     echo "check-worlds: $package: $(sort -u <<<"$tree" | wc -l) packages, none of them burn"
 done
+# The shaders as text need no graphics API.
+if cargo tree --edges normal,build --prefix none -p veni-gpu --no-default-features | grep -E '^(wgpu|naga)'; then
+    echo "check-worlds: veni-gpu without default features pulls in the crates above" >&2
+    exit 1
+fi
 # The check must be able to fail: with the learning world it finds burn.
 if ! cargo tree --edges normal,build --prefix none -p veni-core --features learn | grep -qE '^burn'; then
     echo "check-worlds: burn was not found where it must be: the check is blind" >&2

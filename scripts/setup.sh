@@ -2,9 +2,18 @@
 # Installs what the tests need beyond Rust. Debian and Ubuntu are served; elsewhere it says what to install.
 set -euo pipefail
 
-# A C compiler links Rust programs, criterion and the command line need nothing else.
+# A C compiler links Rust programs; criterion and the command line need nothing else.
 need=()
 command -v cc >/dev/null || need+=(gcc libc6-dev)
+
+# The GPU tests run on any Vulkan, Metal or DirectX 12 driver. On Linux without one, Mesa's lavapipe computes on the CPU;
+# the validation layer listens in if it is there. VENI_SKIP_GPU=1 goes without.
+if [[ $(uname -s) == Linux && ${VENI_SKIP_GPU:-0} != 1 ]]; then
+    shopt -s nullglob
+    drivers=(/usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json)
+    loader=$(ldconfig -p 2>/dev/null | grep -c 'libvulkan\.so\.1' || true)
+    ((${#drivers[@]} && loader)) || need+=(mesa-vulkan-drivers libvulkan1 vulkan-validationlayers)
+fi
 
 if ((${#need[@]})); then
     if command -v apt-get >/dev/null; then
@@ -14,7 +23,8 @@ if ((${#need[@]})); then
         $sudo apt-get update -qq
         $sudo apt-get install -qq --no-install-recommends "${need[@]}" >&2
     else
-        echo "setup: install a C linker (package gcc or clang) with your package manager, then run this again" >&2
+        echo "setup: install with your package manager, then run this again: a C linker (gcc or clang) and a Vulkan" \
+            "driver with its loader (Mesa), or set VENI_SKIP_GPU=1" >&2
         exit 1
     fi
 fi

@@ -4,5 +4,5 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/setup.sh
 # The ndarray device is built in as well, so that the golden numbers run on both CPU devices.
-cargo test --release --workspace --features veni/ndarray,veni-cli/ndarray "$@"
+cargo test --release --workspace --features veni/gpu,veni/ndarray,veni-cli/ndarray "$@"
 scripts/check-worlds.sh

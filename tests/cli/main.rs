@@ -4,6 +4,8 @@
 mod bad_input;
 mod bake;
 mod encode;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod inspect;
 mod readers;
 mod training;

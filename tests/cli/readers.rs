@@ -16,11 +16,12 @@ pub(crate) struct Image {
 }
 
 impl Image {
-    /// The largest relative difference to `other`, in units of each value's larger magnitude.
+    /// The largest relative difference to `other`, in units of each value's larger magnitude; NaN if one is.
     pub(crate) fn difference(&self, other: &Self) -> f32 {
         assert_eq!((self.width, self.height), (other.width, other.height), "sizes differ");
         let pairs = self.pixels.iter().flatten().zip(other.pixels.iter().flatten());
-        pairs.map(|(a, b)| (a - b).abs() / a.abs().max(b.abs()).max(1e-20)).fold(0.0, f32::max)
+        let differences = pairs.map(|(a, b)| (a - b).abs() / a.abs().max(b.abs()).max(1e-20));
+        differences.fold(0.0, |worst, d| if d.is_nan() || d > worst { d } else { worst })
     }
 
     /// This image with its columns rolled to the left by `columns`.

@@ -37,6 +37,8 @@ impl Dir {
     pub(crate) fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_veni-cli"));
         command.current_dir(self.0.path()).args(args).stdin(Stdio::null());
+        // a layer of Mesa's that sorts graphics devices complains on stderr where there is no desktop
+        command.env("NODEVICE_SELECT", "1");
         command
     }
 

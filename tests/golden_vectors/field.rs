@@ -58,9 +58,9 @@ struct Dead {
 
 /// Sizes of a field, from the configuration.
 pub(crate) struct Sizes {
-    n: usize,
-    hidden: usize,
-    layers: usize,
+    pub(crate) n: usize,
+    pub(crate) hidden: usize,
+    pub(crate) layers: usize,
     /// Whether the directional input is encoded.
     encoded: bool,
     /// Whether the conditioning is.
@@ -137,15 +137,16 @@ impl Sizes {
     }
 }
 
+/// The VN-ReLU of the authors' program that the case is from.
+pub(crate) fn form(case: &Case) -> VnReluForm {
+    if case.module().starts_with("RENI") { VnReluForm::ReferenceNormGuard } else { VnReluForm::Reference }
+}
+
 /// The authors' decoder with its weights, from `case` (parameters under `prefix` in front of each key).
 pub(crate) fn build(case: &Case, prefix: &str, device: &Device) -> Decoder {
     let sizes = Sizes::of(case);
     let mut config = DecoderConfig { hidden: sizes.hidden, layers: sizes.layers, ..DecoderConfig::default() };
-    config.vn_relu = if case.module().starts_with("RENI") {
-        VnReluForm::ReferenceNormGuard
-    } else {
-        VnReluForm::Reference
-    };
+    config.vn_relu = form(case);
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0);
     let mut decoder = Decoder::new(&config, sizes.n, &mut rng, device);
     if sizes.encoded_condition {
@@ -242,19 +243,22 @@ fn activate(case: &Case, x: Tensor<3>) -> Tensor<3> {
     }
 }
 
+/// The case that holds the weights, if it is not `case` itself; the error says why there is none.
+pub(crate) fn companion(case: &Case) -> Result<Option<Case>, String> {
+    if case.get("param.network.fc.bias").is_some() || case.config.get("filler_seed").is_some() {
+        return Ok(None);
+    }
+    let note = case.text("note").unwrap_or_default();
+    let named = note.split("params: see ").nth(1).map(|s| s.split([';', ' ', ',']).next().unwrap_or(s));
+    let name = named.ok_or("no weights, and no note where they are")?;
+    let found = case.sibling(name).map(Some);
+    found.ok_or_else(|| format!("its weights are in {name}, which is not in this folder"))
+}
+
 fn compare(case: &Case, device: &Device) -> Outcome {
-    let companion = match (case.get("param.network.fc.bias"), case.config.get("filler_seed")) {
-        (None, None) => {
-            let note = case.text("note").unwrap_or_default();
-            let named =
-                note.split("params: see ").nth(1).map(|s| s.split([';', ' ', ',']).next().unwrap_or(s));
-            let Some(name) = named else { return Skipped("no weights, and no note where they are".into()) };
-            match case.sibling(name) {
-                Some(companion) => Some(companion),
-                None => return Skipped(format!("its weights are in {name}, which is not in this folder")),
-            }
-        }
-        _ => None,
+    let companion = match companion(case) {
+        Ok(companion) => companion,
+        Err(reason) => return Skipped(reason),
     };
     let source = companion.as_ref().unwrap_or(case);
     let decoder = build(source, "", device);

@@ -4,6 +4,7 @@
 //! case. Which module computes it is read from the file's metadata, sizes from its tensors; a kind that
 //! no module here knows is reported as skipped, by name. Devices: flex, and ndarray where that feature
 //! is compiled in; `VENI_GOLDEN_DEVICE` restricts the run to one of them.
+//! With the feature `gpu`, the fields are computed by the GPU decoder too ([`gpu`]).
 //! `VENI_GOLDEN_VERBOSE` lists how much of its tolerance every tensor uses.
 
 mod case;
@@ -14,6 +15,9 @@ mod encoder;
 mod field;
 mod filler;
 mod fit;
+mod fit_rounding;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod image_loading;
 mod layers;
 mod losses;

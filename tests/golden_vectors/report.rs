@@ -79,7 +79,7 @@ pub(crate) fn run_folder(label: &str, folder: &Path, device: &Device) {
 }
 
 /// Prints past the test framework's capture, so that the counts of a green run are seen too.
-fn summarise(label: &str, results: &[(String, Verdict)]) {
+pub(crate) fn summarise(label: &str, results: &[(String, Verdict)]) {
     let (mut text, mut counts, mut tensors, mut closest) =
         (String::new(), [0usize; 3], 0, (0.0, String::new()));
     let verbose = std::env::var_os("VENI_GOLDEN_VERBOSE").is_some();

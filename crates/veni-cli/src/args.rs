@@ -14,14 +14,15 @@ use crate::commands;
     about = "Natural light for renderers, from a learned prior of outdoor skies",
     long_about = "Natural light for renderers, from a learned prior of outdoor skies.\n\n\
         VENI turns an HDR environment map into a few vectors (a latent) that rotate with it, and a latent \
-        back into radiance for any direction. This tool bakes skies to image files, encodes panoramas, \
-        trains models and shows what is inside files.",
+        back into radiance for any direction. This tool bakes skies to image files, on the graphics card if there \
+        is one, encodes panoramas, trains models, shows what is inside files and measures how fast this machine is.",
     after_help = "Results are printed on stdout, everything else on stderr.\n\
         Exit codes: 0 fine; 1 ran, but stopped early or the answer is no; 2 error.\n\n\
         Examples:\n  \
         veni-cli bake --seed 7 -o sky.exr             a random sky\n  \
         veni-cli sample -o sheet.png                  sixteen random skies on one sheet\n  \
-        veni-cli inspect sky.exr                      size, range, sun, the latent inside\n\n\
+        veni-cli inspect sky.exr                      size, range, sun, the latent inside\n  \
+        veni-cli inspect --devices                    which graphics devices can bake\n\n\
         'veni-cli help COMMAND' explains a command.",
     propagate_version = true
 )]
@@ -46,6 +47,7 @@ pub(crate) enum Command {
     #[cfg(feature = "learn")]
     Encode(commands::encode::Encode),
     Inspect(commands::inspect::Inspect),
+    Bench(commands::bench::Bench),
     #[cfg(feature = "learn")]
     Train(commands::train::Train),
     Completions(commands::completions::Completions),
@@ -77,11 +79,13 @@ impl From<Force> for veni_core::output::Overwrite {
 /// What decodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DecodeDevice {
-    /// The fastest one at hand: the CPU in this build
+    /// The graphics card if there is one, else the CPU; never a card emulated in software
     #[default]
     Auto,
     /// All CPU cores
     Cpu,
+    /// The first device that 'veni-cli inspect --devices' lists, a software one too
+    Gpu,
 }
 
 #[cfg(test)]

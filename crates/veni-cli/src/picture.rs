@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use clap::ValueEnum;
-use veni_core::field::Field;
 use veni_core::latent::Latent;
 use veni_core::panorama::Panorama;
 use veni_core::panorama::tonemap::Tonemap;
-use veni_core::sphere::{CubeFace, Equirect, Frame};
+use veni_core::sphere::{Equirect, Frame};
 
 use crate::commands::bake::{FrameName, Layout};
+use crate::device::{Baker, Directions};
 use crate::output::{CUBE_FACES, FRAME, LATENT, MODEL};
 use crate::size::Size;
 
@@ -18,9 +18,6 @@ use crate::size::Size;
 const WIDTH: usize = 1024;
 /// Default edge of a cube face: the same resolution at the centre of a face.
 const EDGE: usize = WIDTH / 4;
-
-/// Pixels of a cube map that are decoded at a time.
-const CUBE_BAND: usize = 1 << 18;
 
 /// An image to bake.
 pub(crate) struct Picture {
@@ -50,39 +47,12 @@ impl Picture {
         self.frame.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default()
     }
 
-    /// The rows from the top, a few in memory at a time.
-    pub(crate) fn rows(
-        &self,
-        field: &Field,
-        each: &mut dyn FnMut(&[[f32; 3]]) -> veni_core::Result<()>,
-    ) -> veni_core::Result<()> {
+    /// Which direction each pixel has.
+    pub(crate) fn directions(&self) -> Directions {
         match self.layout {
-            Layout::Equirect => field.bake_rows(self.grid, 0..self.grid.height, |_, row| each(row)),
-            Layout::Cubemap => self.cube_rows(field, each),
+            Layout::Equirect => Directions::Equirect(self.grid),
+            Layout::Cubemap => Directions::Cube { edge: self.grid.width, frame: Frame::from(self.frame) },
         }
-    }
-
-    fn cube_rows(
-        &self,
-        field: &Field,
-        each: &mut dyn FnMut(&[[f32; 3]]) -> veni_core::Result<()>,
-    ) -> veni_core::Result<()> {
-        let (edge, frame) = (self.grid.width, Frame::from(self.frame));
-        let band = (CUBE_BAND / edge).clamp(1, edge);
-        let mut pixels = vec![[0.0; 3]; band * edge];
-        let mut directions = Vec::with_capacity(pixels.len());
-        for face in CubeFace::ALL {
-            for first in (0..edge).step_by(band) {
-                let rows = first..edge.min(first + band);
-                directions.clear();
-                directions
-                    .extend(rows.flat_map(|row| (0..edge).map(move |i| face.direction(frame, edge, i, row))));
-                let pixels = &mut pixels[..directions.len()];
-                field.radiance_batch(&directions, pixels);
-                pixels.chunks_exact(edge).try_for_each(&mut *each)?;
-            }
-        }
-        Ok(())
     }
 
     /// Whether the image is a latitude-longitude panorama.
@@ -127,7 +97,7 @@ impl From<FrameName> for Frame {
 }
 
 /// The tone curve of a preview, from a small bake, so that it is known before the first row of a large one.
-pub(crate) fn preview_tonemap(field: &Field) -> Tonemap {
+pub(crate) fn preview_tonemap(baker: &Baker) -> Result<Tonemap> {
     let grid = Equirect::new(128, 64);
-    Tonemap::filmic(&Panorama::new(grid, field.bake(grid)), 0.0)
+    Ok(Tonemap::filmic(&Panorama::new(grid, baker.bake(grid)?), 0.0))
 }

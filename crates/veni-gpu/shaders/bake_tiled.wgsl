@@ -29,18 +29,18 @@ fn veni_bake(
 // x = LN(x + W2 max(0, W1 x + b1) + b2) with the norm of the attention before it.
 fn residual_layer(latent: u32, layer: u32, index: u32, x: ptr<function, Tile>) {
     let role = role_of(index);
-    let beta1 = veni_vector(layer, VENI_BETA1) + role.group;
-    let bias1 = veni_vector(layer, VENI_BIAS1) + role.group;
-    let bias2 = veni_vector(layer, VENI_BIAS2) + role.group;
+    let beta1 = veni_vector(layer, VENI_FIRST_BETA) + role.group;
+    let bias1 = veni_vector(layer, VENI_FIRST_BIAS) + role.group;
+    let bias2 = veni_vector(layer, VENI_SECOND_BIAS) + role.group;
     let shift = latent + (layer + 1u) * VENI_COLUMNS + role.group;
-    normalise(veni_vector(layer, VENI_GAMMA1), index, x);
+    normalise(veni_vector(layer, VENI_FIRST_GAMMA), index, x);
     add_vector(x, veni_vectors[beta1], veni_vectors[beta1 + VENI_GROUPS]);
     var y = broadcast(veni_vectors[bias1], veni_vectors[bias1 + VENI_GROUPS]);
     multiply(veni_matrix_row(layer, 0u), index, x, &y);
     VENI_FOR_SIXTEEN(y[@] = max(y[@], vec4f());)
     add_vector(x, veni_vectors[bias2], veni_vectors[bias2 + VENI_GROUPS]);
     multiply(veni_matrix_row(layer, 1u), index, &y, x);
-    normalise(veni_vector(layer, VENI_GAMMA2), index, x);
+    normalise(veni_vector(layer, VENI_SECOND_GAMMA), index, x);
     add_vector(x, veni_latents[shift], veni_latents[shift + VENI_GROUPS]);
 }
 

@@ -4,10 +4,10 @@
 // hundreds of turns, so angles are kept in turns, where reduction is exact, and the polynomials are our own.
 
 struct VeniFeatures {
-    sin1: f32,
-    sin4: f32,
-    cos1: f32,
-    cos4: f32,
+    sin_once: f32,
+    sin_fourfold: f32,
+    cos_once: f32,
+    cos_fourfold: f32,
     value: f32,
 }
 

@@ -4,8 +4,6 @@
 //   veni_matrices: array<vec4f> (or vec4h), veni_vectors: array<vec4f>, veni_latents: array<vec4f>.
 // Four columns, sixteen features, are computed at a time: their sums stay in registers while the inputs run.
 
-alias VeniActivations = array<vec4f, VENI_COLUMNS>;
-
 fn veni_weight(row: u32, column: u32) -> vec4f {
     return vec4f(veni_matrices[row * VENI_COLUMNS + column]);
 }
@@ -28,24 +26,24 @@ fn veni_exp(log_radiance: vec3f) -> vec3f {
 // The same by any of the latents that were uploaded together.
 fn veni_log_radiance_of(index: u32, direction: vec3f) -> vec3f {
     let latent = veni_latent(index);
-    var x: VeniActivations;
+    var x: array<vec4f, VENI_COLUMNS>;
     veni_project(latent, direction, &x);
     for (var layer = 0u; layer < VENI_LAYERS; layer++) {
-        veni_normalise(layer, VENI_GAMMA1, &x);
+        veni_normalise(layer, VENI_FIRST_GAMMA, &x);
         for (var c = 0u; c < VENI_COLUMNS; c++) {
-            x[c] += veni_vectors[veni_vector(layer, VENI_BETA1) + c];
+            x[c] += veni_vectors[veni_vector(layer, VENI_FIRST_BETA) + c];
         }
-        var y: VeniActivations;
+        var y: array<vec4f, VENI_COLUMNS>;
         for (var c = 0u; c < VENI_COLUMNS; c++) {
-            y[c] = veni_vectors[veni_vector(layer, VENI_BIAS1) + c];
+            y[c] = veni_vectors[veni_vector(layer, VENI_FIRST_BIAS) + c];
         }
         veni_multiply(veni_matrix_row(layer, 0u), &x, &y);
         for (var c = 0u; c < VENI_COLUMNS; c++) {
             y[c] = max(y[c], vec4f());
-            x[c] += veni_vectors[veni_vector(layer, VENI_BIAS2) + c];
+            x[c] += veni_vectors[veni_vector(layer, VENI_SECOND_BIAS) + c];
         }
         veni_multiply(veni_matrix_row(layer, 1u), &y, &x);
-        veni_normalise(layer, VENI_GAMMA2, &x);
+        veni_normalise(layer, VENI_SECOND_GAMMA, &x);
         for (var c = 0u; c < VENI_COLUMNS; c++) {
             x[c] += veni_latents[latent + (layer + 1u) * VENI_COLUMNS + c];
         }
@@ -60,16 +58,16 @@ fn veni_log_radiance_of(index: u32, direction: vec3f) -> vec3f {
 }
 
 // x = input bias + encoded direction times the input matrix.
-fn veni_project(latent: u32, direction: vec3f, x: ptr<function, VeniActivations>) {
+fn veni_project(latent: u32, direction: vec3f, x: ptr<function, array<vec4f, VENI_COLUMNS>>) {
     for (var c = 0u; c < VENI_COLUMNS; c += VENI_BLOCK) {
         VENI_FOR_BLOCK(var sum@ = veni_latents[latent + c + @u];)
         for (var input = 0u; input < veni_inputs(); input++) {
             let f = veni_encode(latent, input, direction);
             let row = 5u * input;
-            VENI_FOR_BLOCK(sum@ += f.sin1 * veni_weight(row, c + @u);)
-            VENI_FOR_BLOCK(sum@ += f.sin4 * veni_weight(row + 1u, c + @u);)
-            VENI_FOR_BLOCK(sum@ += f.cos1 * veni_weight(row + 2u, c + @u);)
-            VENI_FOR_BLOCK(sum@ += f.cos4 * veni_weight(row + 3u, c + @u);)
+            VENI_FOR_BLOCK(sum@ += f.sin_once * veni_weight(row, c + @u);)
+            VENI_FOR_BLOCK(sum@ += f.sin_fourfold * veni_weight(row + 1u, c + @u);)
+            VENI_FOR_BLOCK(sum@ += f.cos_once * veni_weight(row + 2u, c + @u);)
+            VENI_FOR_BLOCK(sum@ += f.cos_fourfold * veni_weight(row + 3u, c + @u);)
             VENI_FOR_BLOCK(sum@ += f.value * veni_weight(row + 4u, c + @u);)
         }
         VENI_FOR_BLOCK((*x)[c + @u] = sum@;)
@@ -77,7 +75,7 @@ fn veni_project(latent: u32, direction: vec3f, x: ptr<function, VeniActivations>
 }
 
 // y += x times the matrix that begins at a row.
-fn veni_multiply(first: u32, x: ptr<function, VeniActivations>, y: ptr<function, VeniActivations>) {
+fn veni_multiply(first: u32, x: ptr<function, array<vec4f, VENI_COLUMNS>>, y: ptr<function, array<vec4f, VENI_COLUMNS>>) {
     for (var c = 0u; c < VENI_COLUMNS; c += VENI_BLOCK) {
         VENI_FOR_BLOCK(var sum@ = (*y)[c + @u];)
         for (var k = 0u; k < VENI_COLUMNS; k++) {
@@ -93,7 +91,7 @@ fn veni_multiply(first: u32, x: ptr<function, VeniActivations>, y: ptr<function,
 }
 
 // x = gamma (x - mean) / sqrt(variance + 1e-5) over the features. Padding stays 0: its gamma is.
-fn veni_normalise(layer: u32, gamma: u32, x: ptr<function, VeniActivations>) {
+fn veni_normalise(layer: u32, gamma: u32, x: ptr<function, array<vec4f, VENI_COLUMNS>>) {
     var sum = vec4f();
     for (var c = 0u; c < VENI_COLUMNS; c++) {
         sum += (*x)[c];

@@ -23,11 +23,11 @@ fn veni_matrix_row(layer: u32, part: u32) -> u32 {
     return 5u * veni_padded_inputs() + (2u * layer + part) * 4u * VENI_COLUMNS;
 }
 
-const VENI_GAMMA1: u32 = 0u;
-const VENI_BETA1: u32 = 1u;
-const VENI_BIAS1: u32 = 2u;
-const VENI_BIAS2: u32 = 3u;
-const VENI_GAMMA2: u32 = 4u;
+const VENI_FIRST_GAMMA: u32 = 0u;
+const VENI_FIRST_BETA: u32 = 1u;
+const VENI_FIRST_BIAS: u32 = 2u;
+const VENI_SECOND_BIAS: u32 = 3u;
+const VENI_SECOND_GAMMA: u32 = 4u;
 
 // One of the five vectors of a layer.
 fn veni_vector(layer: u32, which: u32) -> u32 {

@@ -136,9 +136,9 @@ fn stage_features(latent: u32, input: u32, place: u32, quad: u32) {
     let c = veni_encode(latent, i, tile_directions[4u * quad + 2u].xyz);
     let d = veni_encode(latent, i, tile_directions[4u * quad + 3u].xyz);
     let at = activations() + 5u * place * VENI_QUADS + quad;
-    slab[at] = vec4f(a.sin1, b.sin1, c.sin1, d.sin1);
-    slab[at + VENI_QUADS] = vec4f(a.sin4, b.sin4, c.sin4, d.sin4);
-    slab[at + 2u * VENI_QUADS] = vec4f(a.cos1, b.cos1, c.cos1, d.cos1);
-    slab[at + 3u * VENI_QUADS] = vec4f(a.cos4, b.cos4, c.cos4, d.cos4);
+    slab[at] = vec4f(a.sin_once, b.sin_once, c.sin_once, d.sin_once);
+    slab[at + VENI_QUADS] = vec4f(a.sin_fourfold, b.sin_fourfold, c.sin_fourfold, d.sin_fourfold);
+    slab[at + 2u * VENI_QUADS] = vec4f(a.cos_once, b.cos_once, c.cos_once, d.cos_once);
+    slab[at + 3u * VENI_QUADS] = vec4f(a.cos_fourfold, b.cos_fourfold, c.cos_fourfold, d.cos_fourfold);
     slab[at + 4u * VENI_QUADS] = vec4f(a.value, b.value, c.value, d.value);
 }

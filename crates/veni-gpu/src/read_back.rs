@@ -57,7 +57,7 @@ pub fn bake_rows<E: From<Error>>(
     let [one, two] = host;
     let host = [one?, two?];
     let start = |rows: Range<u32>, into: &Buffer| -> Result<Pending> {
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = encoder(device)?;
         let bake = Bake::rows(&radiance, picture.grid, rows.clone()).frame(picture.frame);
         decoder.bake(&mut encoder, latents, &bake)?;
         let bytes = 16 * u64::from(width) * u64::from(rows.end - rows.start);
@@ -88,7 +88,7 @@ pub fn bake_rows<E: From<Error>>(
 pub fn buffer(device: &Device, queue: &Queue, from: &Buffer) -> Result<Vec<[f32; 3]>> {
     let size = from.size();
     let host = host_buffer(device, size)?;
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut encoder = encoder(device)?;
     encoder.copy_buffer_to_buffer(from, 0, &host, 0, size);
     let mut pixels = Vec::new();
     submit(device, queue, encoder, &host, size)?.read(device, &host, &mut pixels)?;
@@ -111,7 +111,7 @@ pub fn texture(device: &Device, queue: &Queue, from: &Texture) -> Result<Vec<[f3
     let stride = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let size = u64::from(stride) * u64::from(height) * u64::from(layers);
     let host = host_buffer(device, size)?;
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut encoder = encoder(device)?;
     let source = TexelCopyTextureInfo {
         texture: from,
         mip_level: 0,
@@ -131,6 +131,11 @@ pub fn texture(device: &Device, queue: &Queue, from: &Texture) -> Result<Vec<[f3
         false => std::array::from_fn(|c| bytemuck::pod_read_unaligned(&texel[4 * c..4 * c + 4])),
     };
     Ok(texels.map(rgb).collect())
+}
+
+fn encoder(device: &Device) -> Result<wgpu::CommandEncoder> {
+    let descriptor = wgpu::CommandEncoderDescriptor { label: Some("veni read back") };
+    guarded(device, "veni read back", || device.create_command_encoder(&descriptor))
 }
 
 fn host_buffer(device: &Device, size: u64) -> Result<Buffer> {

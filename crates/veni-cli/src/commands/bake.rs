@@ -12,6 +12,7 @@ use veni_core::panorama::tonemap::{Curve, Tonemap};
 use veni_core::panorama::{Precision, WriteFormat, WriteOptions};
 
 use crate::args::{DecodeDevice, Force, ModelArgs};
+use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::picture::{Picture, preview_tonemap};
 use crate::progress::Progress;
@@ -42,12 +43,16 @@ const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
         each oriented as the layers of a cube texture in Vulkan, Direct3D, Metal, OpenGL and WebGPU; the attribute \
         veni:cubeFaces repeats the order. With --frame bevy, z is negated before the lookup, as Bevy's shaders do. \
         Default frame: blender (z up); gltf for cube maps (y up).\n\n\
+        Devices: a graphics card bakes the same picture as the CPU to within rounding, and large ones faster; \
+        the result says what was used. It needs the card's own driver for Vulkan, Metal or Direct3D 12, and nothing \
+        else. 'veni-cli inspect --devices' lists what there is, 'veni-cli bench' measures it.\n\n\
         Examples:\n  \
         veni-cli bake --seed 7 -o sky.exr                      a random sky, 1024 x 512, half precision\n  \
         veni-cli bake --seed 7 -o sky.exr -o sky.png --size 4096\n  \
         veni-cli bake sky.exr -o turned.exr --turn 90 --exposure -1\n  \
         veni-cli bake photo.hdr -o relit.exr                   through the encoder\n  \
-        veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512"
+        veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512\n  \
+        veni-cli bake --seed 7 -o sky.exr --device cpu         the same bits whatever card there is"
 )]
 pub(crate) struct Bake {
     /// Latent file, baked image, or HDR panorama
@@ -133,9 +138,7 @@ impl Bake {
         let picture = Picture::new(self.layout, self.frame, self.size)?;
         let loaded = source::model(&self.model)?;
         let model = &loaded.model;
-        let decoder = match self.device {
-            DecodeDevice::Auto | DecodeDevice::Cpu => model.decoder(),
-        };
+        let device = Device::open(self.device, model, report)?;
         let named = match (&self.latent, self.seed) {
             (Some(path), _) => source::from_file(path, &loaded, report)?,
             (None, Some(seed)) => source::seeded(model, seed),
@@ -143,10 +146,10 @@ impl Bake {
         };
         let latent = self.changed(&named);
         let started = Instant::now();
-        let field = decoder.condition(&latent)?;
+        let baker = device.condition(&latent)?;
         let png = self.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")));
         // the exposure of a preview is that of the sky before --exposure, which would otherwise be undone
-        let tonemap = if png { preview_tonemap(&decoder.condition(&named)?) } else { NEUTRAL };
+        let tonemap = if png { preview_tonemap(&device.condition(&named)?)? } else { NEUTRAL };
         let attributes = picture.attributes(&latent, &model.hash())?;
         let files = |precision| -> veni_core::Result<Vec<_>> {
             let file = |path: &PathBuf| {
@@ -174,7 +177,7 @@ impl Bake {
             let mut progress = Progress::start(report, "row", 0, picture.grid().height as u64);
             let mut done = 0;
             let result = output::write_all(&files, picture.grid(), &mut |push| {
-                picture.rows(&field, &mut |row| {
+                baker.rows(picture.directions(), &mut |row| {
                     if watch
                         && let Some(v) = row.as_flattened().iter().find(|v| **v > HALF_MAX && v.is_finite())
                     {
@@ -201,7 +204,7 @@ impl Bake {
                 (Ok(()), None) => break,
             }
         }
-        self.report(&picture, &latent, precision, started, report)?;
+        self.report(&picture, &latent, precision, device.name(), started, report)?;
         Ok(Outcome::Fine)
     }
 
@@ -218,6 +221,7 @@ impl Bake {
         picture: &Picture,
         latent: &Latent,
         precision: Precision,
+        device: &str,
         started: Instant,
         report: Report,
     ) -> Result<()> {
@@ -225,7 +229,11 @@ impl Bake {
         let precision = if precision == Precision::Half { "half" } else { "float" };
         let from = latent.source.as_deref().unwrap_or("unknown source");
         let files: Vec<_> = self.output.iter().map(|p| p.display().to_string()).collect();
-        let human = format!("{}: {}, {from} ({seconds:.2} s)", files.join(", "), picture.describe(precision));
+        let human = format!(
+            "{}: {}, {from} ({seconds:.2} s on {device})",
+            files.join(", "),
+            picture.describe(precision)
+        );
         let grid = picture.grid();
         let value = json!({
             "files": files,
@@ -234,6 +242,7 @@ impl Bake {
             "layout": self.layout.to_possible_value().map(|v| v.get_name().to_owned()),
             "frame": picture.frame_name(),
             "precision": precision,
+            "device": device,
             "latent": serde_json::from_str::<serde_json::Value>(&latent.to_json()?)?,
             "seconds": seconds,
         });

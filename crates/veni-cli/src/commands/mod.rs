@@ -1,6 +1,7 @@
 //! One command per file: its arguments, with their help, and what it does.
 
 pub(crate) mod bake;
+pub(crate) mod bench;
 pub(crate) mod completions;
 #[cfg(feature = "learn")]
 pub(crate) mod encode;
@@ -23,6 +24,7 @@ pub(crate) fn run(command: Command, report: Report) -> Result<Outcome> {
         #[cfg(feature = "learn")]
         Command::Encode(c) => c.run(report),
         Command::Inspect(c) => c.run(report),
+        Command::Bench(c) => c.run(report),
         #[cfg(feature = "learn")]
         Command::Train(c) => c.run(report),
         Command::Completions(c) => c.run(report),

@@ -13,6 +13,7 @@ use veni_core::panorama::tonemap::Tonemap;
 use veni_core::sphere::Equirect;
 
 use crate::args::{DecodeDevice, Force, ModelArgs};
+use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::progress::Progress;
 use crate::report::{Outcome, Report};
@@ -117,9 +118,7 @@ impl Sample {
         };
         let files = self.latent_files(last, overwrite)?;
         let Loaded { model, .. } = source::model(&self.model)?;
-        let decoder = match self.device {
-            DecodeDevice::Auto | DecodeDevice::Cpu => model.decoder(),
-        };
+        let device = Device::open(self.device, &model, report)?;
         let cell = Equirect::new(width, height);
         let mut sheet = Sheet::new(grid.columns, grid.rows, width, height);
         let mut progress = Progress::start(report, "sky", 0, count as u64);
@@ -128,7 +127,7 @@ impl Sample {
             if let Some(file) = files.get(at) {
                 latent.save(file, overwrite).map_err(with_remedy)?;
             }
-            let sky = Panorama::new(cell, decoder.condition(&latent)?.bake(cell));
+            let sky = Panorama::new(cell, device.condition(&latent)?.bake(cell)?);
             let tonemap = Tonemap::filmic(&sky, 0.0);
             sheet.place(
                 at % grid.columns,
@@ -141,9 +140,10 @@ impl Sample {
         sheet.write(&self.output, overwrite).map_err(with_remedy)?;
         let Grid { columns, rows } = grid;
         let human = format!(
-            "{}: {count} skies, seeds {} to {last}, {columns} x {rows} row by row",
+            "{}: {count} skies, seeds {} to {last}, {columns} x {rows} row by row (on {})",
             self.output.display(),
-            self.seed
+            self.seed,
+            device.name()
         );
         let latents: Vec<_> = files.iter().map(|f| f.display().to_string()).collect();
         let value = json!({
@@ -153,6 +153,7 @@ impl Sample {
             "columns": columns,
             "rows": rows,
             "model": model.hash(),
+            "device": device.name(),
             "latents": latents,
         });
         report.result(human, &value)?;

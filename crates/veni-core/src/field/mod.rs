@@ -16,6 +16,7 @@ mod bake;
 mod block;
 mod condition;
 mod math;
+mod rate;
 mod single;
 mod weights;
 
@@ -25,6 +26,8 @@ use crate::latent::Latent;
 use crate::model::Model;
 use crate::{Error, Result};
 use weights::Weights;
+
+pub use rate::multiply_add_rate;
 
 /// Largest |z_x|, |z_y| of a latent. Beyond it f32 does not resolve the phase of the encoding; trained codes
 /// stay below 10.

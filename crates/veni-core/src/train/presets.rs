@@ -54,8 +54,8 @@ fn varied() -> AugmentConfig {
         polar_warp: 0.4,
         recombine: 0.4,
         recombine_blend: 4.0,
-        azimuth_warp: 0.0,
-        join: 0.0,
+        azimuth_warp: 0.5,
+        join: 0.3,
         join_blend: 0.5,
         mix: 0.3,
         mix_share: 0.5,
@@ -69,7 +69,7 @@ fn group(rate: f64, [warm_up, steps]: [u64; 2], floor: f64, adam: AdamConfig) ->
 }
 
 fn small(latent_vectors: usize) -> TrainConfig {
-    let steps = 10_000;
+    let steps = 12_000;
     let adam = AdamConfig { weight_decay: 0.05, ..AdamConfig::default() };
     TrainConfig {
         seed: 0,

@@ -10,7 +10,13 @@ pub(super) const FIELD: &str = include_str!("../../shaders/field.wgsl");
 /// (and `veni_log_radiance_of(index, direction)`), for pasting into a shader. It has no bindings inside: declare those of
 /// [`field_bindings`]. Directions are unit vectors of the native frame (z up).
 pub fn field(sizes: Sizes) -> String {
-    let constants = constants(sizes, "const");
+    let Sizes { latents, hidden, layers } = sizes;
+    let constants = format!(
+        "// The VENI decoder as a function: fn veni_radiance(direction: vec3f) -> vec3f, for N = {latents}, h = {hidden}, \
+         {layers} layers.\n\
+         // Declare veni_matrices, veni_vectors and veni_latents as read-only storage buffers; see below.\n\n{}",
+        constants(sizes, "const")
+    );
     expand(&[constants.as_str(), LAYOUT, ENCODE, FIELD].join("\n"), sizes)
 }
 

@@ -159,7 +159,8 @@ impl Variant {
         }
     }
 
-    /// The WGSL module.
+    /// The WGSL module. With subgroup sums, compilers other than naga want `enable subgroups;` in front, which naga does
+    /// not know yet.
     ///
     /// # Panics
     /// If it is not [possible](Self::is_possible).
@@ -167,9 +168,6 @@ impl Variant {
         let mut header = String::new();
         if self.weights == Weights::Half {
             header.push_str("enable f16;\n");
-        }
-        if matches!(self.kernel, Kernel::Tiled { subgroups: true, .. }) {
-            header.push_str("enable subgroups;\n");
         }
         header.push_str(&text::constants(self.sizes, "override"));
         header.push_str(&format!("alias VeniWeight = {};\n", self.weights.wgsl()));

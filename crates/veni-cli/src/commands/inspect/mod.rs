@@ -1,5 +1,7 @@
-//! `veni-cli inspect`: what is inside a model, a latent, an image or a training run.
+//! `veni-cli inspect`: what is inside a model, a latent, an image or a training run, and which graphics devices there are.
 
+#[cfg(feature = "gpu")]
+mod devices;
 mod image;
 mod latent;
 mod model;
@@ -18,31 +20,44 @@ use veni_core::Error;
 
 use crate::report::{self, Outcome, Report, is_closed_pipe};
 
-/// Show what is inside models, latents, images and training runs
+/// Show what is inside models, latents, images and training runs, or the graphics devices
 #[derive(Args, Debug)]
 #[command(
     long_about = "Show what is inside models, latents, images and training runs.\n\n\
         Model: sizes, identity, training data, prior. Latent: vectors, lengths, exposure, the model it belongs to. \
         Image: size, storage, attributes, radiance over the sphere, dynamic range, where the sun is, the latent it \
         was baked from. Run folder: how far it is, how good.\n\n\
-        The content decides what a file is, not its name. Radiance statistics are weighted by solid angle.",
+        The content decides what a file is, not its name. Radiance statistics are weighted by solid angle.\n\n\
+        With --devices: every graphics device that could bake, the first of them being the one that '--device gpu' \
+        takes. Backend and driver, what it allows, which optional features (f16, subgroups) the decoder uses there, \
+        its measured rate of multiply-adds, and whether its numbers agree with the CPU's. The exit code is 1 if there \
+        is none, or if one cannot be used or computes wrong numbers.",
     after_help = "Examples:\n  \
         veni-cli inspect sky.exr\n  \
         veni-cli inspect --json *.exr | jq .radiance.max\n  \
-        veni-cli inspect runs/small"
+        veni-cli inspect runs/small\n  \
+        veni-cli inspect --devices"
 )]
 pub(crate) struct Inspect {
     /// Files, or folders of training runs
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required_unless_present = "devices", value_name = "FILE")]
     files: Vec<PathBuf>,
+
+    /// List the graphics devices instead, and measure and check each
+    #[arg(long, conflicts_with = "files")]
+    devices: bool,
 }
 
 impl Inspect {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        if self.devices {
+            return devices(report);
+        }
         let mut failed = Vec::new();
         for path in &self.files {
+            let name = path.display().to_string();
             match describe(path) {
-                Ok(facts) => report.result(facts.text(path), &facts.json(path))?,
+                Ok(facts) => report.result(facts.text(&name), &facts.json("file", &name))?,
                 Err(error) if is_closed_pipe(&error) => return Err(error),
                 Err(error) => failed.push(error),
             }
@@ -51,7 +66,17 @@ impl Inspect {
     }
 }
 
-/// What a path turned out to be, and its properties in the order to show them.
+#[cfg(feature = "gpu")]
+fn devices(report: Report) -> Result<Outcome> {
+    devices::run(report)
+}
+
+#[cfg(not(feature = "gpu"))]
+fn devices(_: Report) -> Result<Outcome> {
+    bail!("inspect --devices: {}", crate::device::NO_GPU)
+}
+
+/// What a path or a device turned out to be, and its properties in the order to show them.
 pub(super) struct Facts {
     kind: &'static str,
     rows: Vec<(&'static str, String)>,
@@ -66,7 +91,7 @@ impl Facts {
     /// A property: a line of text, and the same for machines.
     pub(super) fn add(&mut self, name: &'static str, text: impl Into<String>, json: impl Into<Value>) {
         self.rows.push((name, text.into()));
-        self.json.insert(name.replace(' ', "_"), json.into());
+        self.json.insert(name.replace([' ', '-'], "_"), json.into());
     }
 
     /// A property whose name comes from the file; machines find it under `attributes`.
@@ -82,8 +107,9 @@ impl Facts {
         self.json.contains_key(name)
     }
 
-    fn text(&self, path: &Path) -> String {
-        let mut text = format!("{}: {}", path.display(), self.kind);
+    /// All of it below a title: "name: kind".
+    fn text(&self, name: &str) -> String {
+        let mut text = format!("{name}: {}", self.kind);
         let width = self.rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
         for (name, value) in &self.rows {
             // writing to a String cannot fail
@@ -92,9 +118,10 @@ impl Facts {
         text
     }
 
-    fn json(&self, path: &Path) -> Value {
+    /// All of it as one object, whose first field `key` is the name.
+    fn json(&self, key: &str, name: &str) -> Value {
         let mut object = Map::new();
-        object.insert("file".into(), path.display().to_string().into());
+        object.insert(key.into(), name.into());
         object.insert("kind".into(), self.kind.into());
         object.extend(self.json.clone());
         object.into()

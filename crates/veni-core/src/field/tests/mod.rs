@@ -32,6 +32,8 @@ fn directions(count: usize) -> Vec<[f32; 3]> {
 fn distance(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
     assert_eq!(a.len(), b.len());
     let pairs = a.as_flattened().iter().zip(b.as_flattened());
-    // a NaN counts as the largest distance
-    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, |worst, d| if d <= worst { worst } else { d })
+    // a NaN counts as infinitely far
+    pairs
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, |worst, d| if d.is_nan() { f32::INFINITY } else { d.max(worst) })
 }

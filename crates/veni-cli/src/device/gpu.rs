@@ -1,0 +1,161 @@
+//! Baking on a graphics device: which one, and its rows.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use veni_core::latent::Latent;
+use veni_core::model::Model;
+use veni_core::sphere::Frame;
+use veni_gpu::adapters::{self, Found, Opened};
+use veni_gpu::read_back::{self, Picture};
+use veni_gpu::shader::Grid;
+use veni_gpu::wgpu::AdapterInfo;
+use veni_gpu::{GpuDecoder, GpuLatents};
+
+use super::Directions;
+use crate::args::DecodeDevice;
+use crate::output::Push;
+use crate::report::Report;
+
+/// What to say where no adapter is.
+pub(crate) const NO_ADAPTER: &str = "no graphics device was found: install its driver (a Vulkan driver on Linux, where \
+    the package mesa-vulkan-drivers also brings one in software)";
+
+/// A model on a graphics device.
+pub(crate) struct Gpu(Arc<Inner>);
+
+struct Inner {
+    name: String,
+    opened: Opened,
+    decoder: GpuDecoder,
+}
+
+/// A latent on a graphics device.
+pub(crate) struct Conditioned {
+    gpu: Arc<Inner>,
+    latents: GpuLatents,
+}
+
+/// All adapters, graphics cards first and software last.
+pub(crate) fn list() -> Vec<Found> {
+    pollster::block_on(adapters::list())
+}
+
+/// What an adapter is called in results: with its backend, since one card may be there under several.
+pub(crate) fn name(info: &AdapterInfo) -> String {
+    format!("{}, {}", info.name.trim(), info.backend)
+}
+
+/// The device for a choice, or nothing if that is the CPU.
+pub(super) fn open(choice: DecodeDevice, model: &Model, report: Report) -> Result<Option<Gpu>> {
+    let look = match choice {
+        DecodeDevice::Cpu => false,
+        DecodeDevice::Auto => may_have_card(),
+        DecodeDevice::Gpu => true,
+    };
+    let adapters = if look { list() } else { Vec::new() };
+    let Some(found) = pick(choice, &adapters, Found::is_software) else {
+        if choice == DecodeDevice::Gpu {
+            bail!("--device gpu: {NO_ADAPTER}, or use --device cpu");
+        }
+        return Ok(None);
+    };
+    let name = name(found.info());
+    match Gpu::open(found, model) {
+        Ok(gpu) => {
+            if found.is_software() {
+                report.note(format_args!("note: {name} is a software adapter; --device cpu is faster"));
+            }
+            Ok(Some(gpu))
+        }
+        Err(error) if choice == DecodeDevice::Auto => {
+            report.note(format_args!("note: {name} cannot be used ({error}); baking on the CPU"));
+            Ok(None)
+        }
+        Err(error) => bail!("--device gpu: {name}: {error}; update its driver, or use --device cpu"),
+    }
+}
+
+/// Whether this machine has what a card's driver talks to. Where it has not, starting the drivers costs a tenth of a
+/// second for nothing, and Mesa's complain on stderr if there is no desktop either.
+fn may_have_card() -> bool {
+    let kernel_interfaces = ["/dev/dri", "/dev/nvidiactl", "/dev/dxg", "/dev/kgsl-3d0", "/dev/mali0"];
+    !cfg!(target_os = "linux") || kernel_interfaces.iter().any(|path| Path::new(path).exists())
+}
+
+/// The adapter for a choice, of those in the order of preference.
+fn pick<T>(choice: DecodeDevice, adapters: &[T], is_software: impl Fn(&T) -> bool) -> Option<&T> {
+    match choice {
+        DecodeDevice::Cpu => None,
+        DecodeDevice::Gpu => adapters.first(),
+        DecodeDevice::Auto => adapters.iter().find(|adapter| !is_software(adapter)),
+    }
+}
+
+impl Gpu {
+    fn open(found: &Found, model: &Model) -> veni_gpu::Result<Self> {
+        let opened = pollster::block_on(found.open())?;
+        let decoder = GpuDecoder::new(&opened.device, model)?;
+        Ok(Self(Arc::new(Inner { name: name(found.info()), opened, decoder })))
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    pub(super) fn condition(&self, latent: &Latent) -> veni_gpu::Result<Conditioned> {
+        let latents = self.0.decoder.condition(&self.0.opened.queue, latent)?;
+        Ok(Conditioned { gpu: Arc::clone(&self.0), latents })
+    }
+}
+
+impl Conditioned {
+    /// Hands over the rows of an image from the top. While one band is read, the next is computed.
+    pub(super) fn rows(&self, directions: Directions, each: Push<'_>) -> veni_core::Result<()> {
+        let Inner { name, opened, decoder } = &*self.gpu;
+        let picture = picture(directions);
+        let rows = read_back::bake_rows(decoder, &opened.queue, &self.latents, picture, |_, row| {
+            each(row).map_err(veni_gpu::Error::Core)
+        });
+        rows.map_err(|error| match error {
+            // what `each` said is no fault of the device
+            veni_gpu::Error::Core(error) => error,
+            error => veni_core::Error::unsupported(format!("{name}: {error}; try --device cpu")),
+        })
+    }
+}
+
+/// Sides fit in 32 bits: `--size` allows far less.
+fn picture(directions: Directions) -> Picture {
+    match directions {
+        Directions::Equirect(grid) => Picture {
+            grid: Grid::Equirect { width: grid.width as u32, height: grid.height as u32 },
+            frame: Frame::default(),
+        },
+        Directions::Cube { edge, frame } => Picture { grid: Grid::Cube { size: edge as u32 }, frame },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn software_is_taken_only_when_asked_for() {
+        let pick = |choice, adapters: &[&'static str]| {
+            pick(choice, adapters, |name| name.starts_with("soft")).copied()
+        };
+        let (auto, cpu, gpu) = (DecodeDevice::Auto, DecodeDevice::Cpu, DecodeDevice::Gpu);
+        for (adapters, by_auto, by_gpu) in [
+            (&["card", "other", "soft"][..], Some("card"), Some("card")),
+            (&["soft", "softer", "card"], Some("card"), Some("soft")),
+            (&["soft", "softer"], None, Some("soft")),
+            (&[], None, None),
+        ] {
+            assert_eq!(pick(auto, adapters), by_auto, "{adapters:?}");
+            assert_eq!(pick(gpu, adapters), by_gpu, "{adapters:?}");
+            assert_eq!(pick(cpu, adapters), None, "{adapters:?}");
+        }
+    }
+}
