@@ -1,5 +1,5 @@
 // Kernel "each": every invocation evaluates the whole network for its own direction. No barriers and no shared
-// memory: what a software adapter runs best, and what any hidden size fits in.
+// memory, so any hidden size fits.
 
 @compute @workgroup_size(VENI_EACH_THREADS)
 fn veni_bake(

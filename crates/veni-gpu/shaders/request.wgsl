@@ -25,6 +25,4 @@ struct VeniRequest {
     logarithm: u32,
     // Index of this dispatch's first tile
     tile: u32,
-    // Row of the target texture where the first direction goes
-    row: u32,
 }

@@ -3,8 +3,7 @@
 @group(0) @binding(4) var target_texture: texture_storage_2d_array<VENI_FORMAT, write>;
 
 fn store(latent: u32, index: u32, rgb: vec3f) {
-    let at = index + request.row * request.width;
-    var texel = vec2u(at % request.width, at / request.width);
+    var texel = vec2u(index % request.width, index / request.width);
     var layer = latent;
     if request.arrangement == 1u {
         layer = 6u * latent + texel.y / request.height;

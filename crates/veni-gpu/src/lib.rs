@@ -1,6 +1,6 @@
 //! The VENI decoder on the GPU, inside the host's own frame.
 //!
-//! A [`GpuDecoder`](decoder::GpuDecoder) holds a model's weights on the host's `wgpu::Device`.
+//! A [`GpuDecoder`] holds a model's weights on the host's `wgpu::Device`.
 //! [`condition`](decoder::GpuDecoder::condition) folds a latent on the CPU and uploads a few kilobytes;
 //! [`bake`](decoder::GpuDecoder::bake) records a compute pass into the host's command encoder: a panorama, cube
 //! faces, or radiances for a buffer of directions. Nothing here creates an instance, submits, or installs an error

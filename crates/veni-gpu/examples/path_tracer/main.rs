@@ -10,7 +10,7 @@
 //! tracer (`tracer.wgsl`) that shows what one does with a light that is a function:
 //!
 //! - Diffuse surfaces draw half of their directions from a coarse table of the sky's luminance, which the field on the
-//!   CPU fills in a millisecond. The skies have no point-like sun, so nothing needs to be clamped against bright dots.
+//!   CPU fills in a moment. The skies have no point-like sun, so nothing needs to be clamped against bright dots.
 //! - The latent is turned so that the light comes from where it suits the scene; `--turn DEGREES` turns it otherwise.
 //!
 //! The defaults are for adapters in software, such as Mesa's lavapipe. It compiles the network for half a minute or more
@@ -42,7 +42,8 @@ const PATHS: u32 = 1 << 17;
 const TILE: u32 = 8;
 /// The table of light in `tracer.wgsl` is the upper half of this grid.
 const LIGHT: Equirect = Equirect { width: 64, height: 32 };
-/// Where most light comes from, degrees counter-clockwise from +x, where the camera looks: from the left, a little ahead.
+/// Where most light comes from, degrees counter-clockwise from +x, where the camera looks: from the left, slightly
+/// ahead.
 const KEY_LIGHT: f64 = 70.0;
 
 fn main() -> Result<()> {
@@ -324,20 +325,22 @@ impl Options {
         let mut options = Self { seed: 7, size: [192, 108], samples: 16, turn: None, model, out };
         let mut args = std::env::args().skip(1);
         while let Some(name) = args.next() {
-            let mut value = || args.next().ok_or_else(|| format!("{name} needs a value; {USAGE}"));
+            if !["--seed", "--size", "--samples", "--turn", "--model", "-o"].contains(&name.as_str()) {
+                return Err(format!("unknown argument {name}; {USAGE}").into());
+            }
+            let value = args.next().ok_or_else(|| format!("{name} needs a value; {USAGE}"))?;
+            let wrong = || format!("{name} {value}: not of the right form; {USAGE}");
             match name.as_str() {
-                "--seed" => options.seed = value()?.parse()?,
+                "--seed" => options.seed = value.parse().map_err(|_| wrong())?,
                 "--size" => {
-                    let value = value()?;
-                    let (width, height) =
-                        value.split_once('x').ok_or("--size takes WxH, 640x360 for instance")?;
-                    options.size = [width.parse()?, height.parse()?];
+                    let (width, height) = value.split_once('x').ok_or_else(wrong)?;
+                    let side = |text: &str| text.parse::<u32>().map_err(|_| wrong());
+                    options.size = [side(width)?, side(height)?];
                 }
-                "--samples" => options.samples = value()?.parse()?,
-                "--turn" => options.turn = Some(value()?.parse()?),
-                "--model" => options.model = value()?.into(),
-                "-o" => options.out = value()?.into(),
-                _ => return Err(format!("unknown argument {name}; {USAGE}").into()),
+                "--samples" => options.samples = value.parse().map_err(|_| wrong())?,
+                "--turn" => options.turn = Some(value.parse().map_err(|_| wrong())?),
+                "--model" => options.model = value.into(),
+                _ => options.out = value.into(),
             }
         }
         if options.size.contains(&0) || options.samples == 0 {

@@ -135,8 +135,8 @@ struct Leaving {
     weight: vec3f,
 }
 
-// `back` points to where the ray comes from; `u` is random. Every choice takes its part of u.x and stretches it again, so
-// that one well distributed pair serves a whole surface.
+// `back` points to where the ray comes from; `u` is random. Every choice takes its part of u.x and stretches it again,
+// so that one well distributed pair serves a whole surface.
 fn scatter(hit: Hit, back: vec3f, u: vec2f) -> Leaving {
     switch hit.material {
         case METAL: {

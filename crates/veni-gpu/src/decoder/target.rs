@@ -127,7 +127,6 @@ impl<'a> Bake<'a> {
             count,
             latent: 0,
             tile: 0,
-            row: 0,
         };
         Ok((directions, store, request))
     }

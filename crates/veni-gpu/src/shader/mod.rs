@@ -8,7 +8,7 @@
 //!   as a naga_oil module.
 //! - **A compute kernel**: [`Variant::source`] gives the module whose entry point [`ENTRY_POINT`] writes a panorama, cube
 //!   faces or a buffer of radiances; [`Variant::bindings`] its group 0, [`Request`] its uniform,
-//!   [`Variant::workgroups`] its dispatch.
+//!   [`Variant::dispatches`] its dispatches.
 //!
 //! `twin` evaluates the same stages under the same names on the CPU in double precision, for comparing stage by
 //! stage.

@@ -59,8 +59,6 @@ pub struct Request {
     pub latent: u32,
     /// First tile of this dispatch.
     pub tile: u32,
-    /// Row of the target texture where the first direction goes.
-    pub row: u32,
 }
 
 impl Request {
@@ -82,9 +80,12 @@ impl Request {
             [d, e, g, width],
             [h, i, j, height],
             [self.first, self.count, self.latent, self.log_exposure.to_bits()],
-            [self.largest.to_bits(), u32::from(self.logarithm), self.tile, self.row],
+            [self.largest.to_bits(), u32::from(self.logarithm), self.tile, 0],
         ];
-        bytemuck::cast(words)
+        let mut bytes = [0; Self::BYTES];
+        let words = words.as_flattened().iter();
+        bytes.as_chunks_mut::<4>().0.iter_mut().zip(words).for_each(|(b, w)| *b = w.to_le_bytes());
+        bytes
     }
 
     /// What the coordinate axes of the directions are in the native frame of the unturned scene.

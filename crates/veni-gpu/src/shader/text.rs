@@ -20,7 +20,8 @@ pub fn field(sizes: Sizes) -> String {
     expand(&[constants.as_str(), LAYOUT, ENCODE, FIELD].join("\n"), sizes)
 }
 
-/// The three declarations that [`field`] needs, in a group and from a binding on.
+/// The three declarations that [`field`] needs, in a group and from a binding on. With [`Weights::Half`] the shader that
+/// they go into begins with `enable f16;`.
 pub fn field_bindings(group: u32, first: u32, weights: Weights) -> String {
     let weight = weights.wgsl();
     let declaration = |i: u32, name: &str, of: &str| {
@@ -34,7 +35,8 @@ pub fn field_bindings(group: u32, first: u32, weights: Weights) -> String {
         .collect()
 }
 
-/// [`field`] and its bindings as a naga_oil module `veni::field`: `#import veni::field::veni_radiance`.
+/// [`field`] and its bindings as a naga_oil module `veni::field`: `#import veni::field::veni_radiance`. naga_oil knows no
+/// `enable f16;`, so the weights are f32: those of a decoder on a device without f16, or [`pack_model`](super::pack_model)'s.
 pub fn field_module(sizes: Sizes, group: u32, first: u32) -> String {
     let bindings = field_bindings(group, first, Weights::Single);
     format!("#define_import_path veni::field\n\n{bindings}\n{}", field(sizes))

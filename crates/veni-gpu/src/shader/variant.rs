@@ -28,8 +28,7 @@ pub enum Kernel {
         /// `columns() / 2` invocations, a power of two, and only whole subgroups.
         subgroups: bool,
     },
-    /// An invocation evaluates the network for its direction alone. For software adapters, and for decoders too wide
-    /// to be tiled.
+    /// An invocation evaluates the network for its direction alone. For decoders too wide to be tiled.
     Each,
 }
 

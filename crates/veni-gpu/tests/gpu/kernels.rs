@@ -39,7 +39,6 @@ impl Work {
             count,
             latent: 0,
             tile: 0,
-            row: 0,
         };
         Self { twin: Twin::new(packed, blocks), directions, request }
     }

@@ -1,0 +1,273 @@
+//! The decoder inside a renderer that owns everything: instance, adapter, device with WebGPU's default limits, error
+//! handler, cube map, command encoder and submission are all the host's.
+//!
+//! ```sh
+//! cargo run --release -p veni-gpu --example own_device            # --seed 7 --model FILE
+//! ```
+//!
+//! Every frame the sky turns by 30 degrees. One command encoder takes two passes: veni bakes the turned light into the
+//! host's cube map, and the host's own pass samples that cube map to compute an ambient cube, the irradiance of a
+//! surface towards each of the six axes (G. McTaggart, "Half-Life 2 / Valve Source Shading"). The numbers are compared
+//! with the same sums over the field on the CPU, and after 90 degrees each face of the cube map must hold the texels
+//! of its neighbour.
+
+use std::f64::consts::TAU;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use veni_core::field::Field;
+use veni_core::latent::Latent;
+use veni_core::model::Model;
+use veni_core::sphere::Frame;
+use veni_gpu::wgpu::{self, BufferUsages, TextureUsages};
+use veni_gpu::{Bake, GpuDecoder, read_back};
+
+type Result<T, E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
+
+/// Texels along an edge of the cube map. The light is smooth: 64 leave a fraction of a percent.
+const FACE: u32 = 64;
+/// Directions per axis, as in the shader below.
+const DIRECTIONS: u32 = 1024;
+const AXES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
+
+/// The host's own pass: a workgroup per axis averages a cosine-weighted spiral of directions around it.
+const AMBIENT_CUBE: &str = "
+@group(0) @binding(0) var sky: texture_cube<f32>;
+@group(0) @binding(1) var smooth_sampler: sampler;
+@group(0) @binding(2) var<storage, read_write> irradiance: array<vec4f>;
+
+const DIRECTIONS: u32 = 1024u;
+var<workgroup> sums: array<vec3f, 64>;
+
+// sin, cos of the azimuth and sin, cos of the polar angle from the axis
+fn around(axis: u32, azimuth: vec2f, polar: vec2f) -> vec3f {
+    let d = vec3f(polar.y * select(1.0, -1.0, (axis & 1u) == 1u), polar.x * azimuth.y, polar.x * azimuth.x);
+    switch axis / 2u {
+        case 0u: { return d; }
+        case 1u: { return d.zxy; }
+        default: { return d.yzx; }
+    }
+}
+
+@compute @workgroup_size(64)
+fn ambient_cube(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) index: u32) {
+    var sum = vec3f();
+    for (var i = index; i < DIRECTIONS; i += 64u) {
+        let z2 = (f32(i) + 0.5) / f32(DIRECTIONS);
+        let turns = fract(f32(i) * 0.61803399);
+        let azimuth = vec2f(sin(6.2831853 * turns), cos(6.2831853 * turns));
+        let direction = around(group.x, azimuth, vec2f(sqrt(1.0 - z2), sqrt(z2)));
+        sum += textureSampleLevel(sky, smooth_sampler, direction, 0.0).rgb;
+    }
+    sums[index] = sum;
+    workgroupBarrier();
+    if index == 0u {
+        for (var i = 1u; i < 64u; i++) {
+            sum += sums[i];
+        }
+        irradiance[group.x] = vec4f(sum * 3.1415927 / f32(DIRECTIONS), 1.0);
+    }
+}
+";
+
+fn main() -> Result<()> {
+    let (model, seed) = arguments()?;
+    let model = Model::load(&model)?;
+
+    // The host's world: default limits, no optional features, and a handler that must never hear of anything, because
+    // veni hands all errors back as values.
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
+    let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()))?;
+    let uncaptured = Arc::new(AtomicU32::new(0));
+    let count = Arc::clone(&uncaptured);
+    device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+        eprintln!("uncaptured: {error}");
+        count.fetch_add(1, Ordering::Relaxed);
+    }));
+    eprintln!("{}", adapter.get_info().name);
+
+    // the host's cube map: any texture of this format and usage
+    let cube = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("sky"),
+        size: wgpu::Extent3d { width: FACE, height: FACE, depth_or_array_layers: 6 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba16Float,
+        usage: TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
+    let host = Host::new(&device, &cube);
+
+    // veni's part: the weights once, the latent once; both stay where they are from here on
+    let latent = Latent::from_seed(&model.prior(), seed);
+    let decoder = GpuDecoder::new(&device, &model)?;
+    let latents = decoder.condition(&queue, &latent)?;
+    // the host draws in glTF's frame, y up; its lookup vectors then need no conversion
+    let bake = Bake::cube(&cube).frame(Frame::Gltf);
+    // compiles now instead of in the first frame
+    decoder.prepare(&latents, &bake)?;
+
+    let field = model.decoder().condition(&latent)?;
+    let mut out = std::io::stdout();
+    let (mut worst, mut unturned) = (0f32, Vec::new());
+    for step in 0..=3 {
+        let turn = TAU / 12.0 * f64::from(step);
+        // a few kilobytes into the same buffer
+        decoder.update(&queue, &latents, 0, &[latent.turned(turn)])?;
+
+        // one encoder: the light, then what the host does with it; one submission, by the host
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        decoder.bake(&mut encoder, &latents, &bake)?;
+        host.ambient_cube(&mut encoder);
+        queue.submit([encoder.finish()]);
+
+        // only to print it: a renderer goes on on the device
+        let found = read_back::buffer(&device, &queue, &host.irradiance)?;
+        let expected = ambient_cube(&field.turned(turn));
+        writeln!(
+            out,
+            "turned by {:.0} degrees: irradiance, and its relative difference from the CPU",
+            turn.to_degrees()
+        )?;
+        for ((axis, found), expected) in AXES.iter().zip(&found).zip(&expected) {
+            let difference = largest_difference(found, expected);
+            worst = worst.max(difference);
+            let [r, g, b] = found;
+            writeln!(out, "  {axis}  {r:.4} {g:.4} {b:.4}  {difference:.1e}")?;
+        }
+        if step == 0 {
+            unturned = read_back::texture(&device, &queue, &cube)?;
+        }
+    }
+
+    // Native +x is glTF's +x, native +y is glTF's -z: a quarter turn moves the light of face +x to -z, -x, +z and back.
+    let turned = read_back::texture(&device, &queue, &cube)?;
+    let face =
+        |texels: &[[f32; 3]], face: usize| texels[face * texels.len() / 6..][..texels.len() / 6].to_vec();
+    let mut moved = 0f32;
+    for (from, to) in [(0, 5), (5, 1), (1, 4), (4, 0)] {
+        for (found, expected) in face(&turned, to).iter().zip(&face(&unturned, from)) {
+            moved = moved.max(largest_difference(found, expected));
+        }
+    }
+    writeln!(out, "largest difference from the CPU: {worst:.1e}")?;
+    writeln!(out, "after a quarter turn each face holds its neighbour's texels, but for {moved:.1e}")?;
+    let uncaptured = uncaptured.load(Ordering::Relaxed);
+    writeln!(out, "errors that reached the host's handler: {uncaptured}")?;
+    // NaN must not pass
+    if !(worst < 0.02 && moved < 0.005) || uncaptured > 0 {
+        return Err("the cube map does not hold the light of the field".into());
+    }
+    Ok(())
+}
+
+/// The host's pass and what it needs.
+struct Host {
+    pipeline: wgpu::ComputePipeline,
+    group: wgpu::BindGroup,
+    irradiance: wgpu::Buffer,
+}
+
+impl Host {
+    fn new(device: &wgpu::Device, cube: &wgpu::Texture) -> Self {
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("ambient cube"),
+            source: wgpu::ShaderSource::Wgsl(AMBIENT_CUBE.into()),
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("ambient cube"),
+            layout: None,
+            module: &module,
+            entry_point: Some("ambient_cube"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        let irradiance = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("ambient cube"),
+            size: 6 * 16,
+            usage: BufferUsages::STORAGE | BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let view = cube.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::Cube),
+            ..wgpu::TextureViewDescriptor::default()
+        });
+        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..wgpu::SamplerDescriptor::default()
+        });
+        let resources = [
+            wgpu::BindingResource::TextureView(&view),
+            wgpu::BindingResource::Sampler(&sampler),
+            irradiance.as_entire_binding(),
+        ];
+        let entries = (0..).zip(resources);
+        let entries: Vec<_> =
+            entries.map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("ambient cube"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        Self { pipeline, group, irradiance }
+    }
+
+    fn ambient_cube(&self, encoder: &mut wgpu::CommandEncoder) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.group, &[]);
+        pass.dispatch_workgroups(6, 1, 1);
+    }
+}
+
+/// What the shader computes, from the field itself: no cube map, no half precision.
+fn ambient_cube(field: &Field) -> Vec<[f32; 3]> {
+    let mut radiance = vec![[0.0; 3]; DIRECTIONS as usize];
+    let of = |axis| {
+        let directions: Vec<_> = (0..DIRECTIONS).map(|i| Frame::Gltf.to_native(direction(axis, i))).collect();
+        field.radiance_batch(&directions, &mut radiance);
+        let sum = |channel: usize| radiance.iter().map(|rgb| f64::from(rgb[channel])).sum::<f64>();
+        [0, 1, 2].map(|channel| (sum(channel) * TAU / 2.0 / f64::from(DIRECTIONS)) as f32)
+    };
+    (0..6).map(of).collect()
+}
+
+/// The i-th direction around an axis, as in the shader.
+fn direction(axis: usize, i: u32) -> [f32; 3] {
+    let z2 = (f64::from(i) + 0.5) / f64::from(DIRECTIONS);
+    let (sin, cos) = (TAU * (f64::from(i) * 0.618_033_988_75).fract()).sin_cos();
+    let sign = if axis % 2 == 1 { -1.0 } else { 1.0 };
+    let r = (1.0 - z2).sqrt();
+    let [x, y, z] = [sign * z2.sqrt(), r * cos, r * sin].map(|v| v as f32);
+    match axis / 2 {
+        0 => [x, y, z],
+        1 => [z, x, y],
+        _ => [y, z, x],
+    }
+}
+
+/// Over the channels, relative to the brightest.
+fn largest_difference(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    let scale = b.iter().copied().fold(0.0, f32::max);
+    a.iter().zip(b).map(|(a, b)| (a - b).abs() / scale).fold(0.0, f32::max)
+}
+
+fn arguments() -> Result<(PathBuf, u64)> {
+    let mut model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/veni-27.safetensors");
+    let mut seed = 7;
+    let mut args = std::env::args().skip(1);
+    while let Some(name) = args.next() {
+        let value = args.next().ok_or_else(|| format!("{name} needs a value"))?;
+        match name.as_str() {
+            "--model" => model = value.into(),
+            "--seed" => seed = value.parse().map_err(|_| format!("--seed {value}: not a whole number"))?,
+            _ => return Err(format!("unknown argument {name}; own_device [--seed S] [--model FILE]").into()),
+        }
+    }
+    Ok((model, seed))
+}

@@ -1,0 +1,75 @@
+//! Writes the decoder's WGSL for a model to standard output, for users of other APIs: pipe it into a file, and from
+//! there through naga or Tint to SPIR-V, MSL or HLSL. Needs no graphics device.
+//!
+//! ```sh
+//! cargo run --release -p veni-gpu --example shader_text > field.wgsl              # a function to paste
+//! cargo run --release -p veni-gpu --example shader_text -- --module > field.wgsl  # a naga_oil module to import
+//! cargo run --release -p veni-gpu --example shader_text -- --kernel > bake.wgsl   # a whole compute kernel
+//! ```
+//!
+//! `--model FILE` takes another model. What a host must bind is said on standard error. The buffers' content comes from
+//! `veni_gpu::shader::{pack_model, pack_latent}`, which need no graphics API either.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use veni_core::model::Model;
+use veni_gpu::shader::{self, Directions, ENTRY_POINT, Kernel, Sizes, Store, Variant, Weights};
+
+/// Workgroup memory that every WebGPU device has, bytes.
+const WORKGROUP_MEMORY: u32 = 16 << 10;
+const USAGE: &str = "shader_text [--function | --module | --kernel] [--model FILE]";
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/veni-27.safetensors");
+    let mut what = String::from("--function");
+    let mut args = std::env::args().skip(1);
+    while let Some(arg) = args.next() {
+        match arg.as_str() {
+            "--function" | "--module" | "--kernel" => what = arg,
+            "--model" => path = PathBuf::from(args.next().ok_or("--model needs a file")?),
+            _ => return Err(format!("unknown argument {arg}; {USAGE}").into()),
+        }
+    }
+    // the text depends on the sizes of the network alone, never on its weights
+    let sizes = Sizes::from(Model::load(&path)?.config());
+    let text = match what.as_str() {
+        "--module" => {
+            eprintln!("#import veni::field::veni_radiance; group 0, bindings 0 to 2 as declared at the top");
+            shader::field_module(sizes, 0, 0)
+        }
+        "--kernel" => kernel(sizes)?,
+        _ => {
+            eprintln!(
+                "fn veni_radiance(direction: vec3f) -> vec3f; declare in a group and at bindings of your choice:"
+            );
+            eprint!("{}", shader::field_bindings(0, 0, Weights::Single));
+            shader::field(sizes)
+        }
+    };
+    std::io::stdout().write_all(text.as_bytes())?;
+    Ok(())
+}
+
+/// Pixels of a panorama or of cube faces into a buffer of vec4f, by WebGPU's default limits.
+fn kernel(sizes: Sizes) -> Result<String, String> {
+    let variant = Variant {
+        sizes,
+        kernel: Kernel::Tiled { memory: WORKGROUP_MEMORY, subgroups: false },
+        weights: Weights::Single,
+        directions: Directions::Grid,
+        store: Store::Buffer,
+    };
+    // a decoder too wide to be tiled
+    let variant = if variant.is_possible() { variant } else { Variant { kernel: Kernel::Each, ..variant } };
+    let threads = variant.kernel.threads(sizes).ok_or_else(|| format!("no kernel for {sizes:?}"))?;
+    let tile = variant.tile();
+    eprintln!("entry point {ENTRY_POINT}: {threads} invocations evaluate {tile} directions");
+    for (binding, what) in variant.bindings().iter().enumerate() {
+        eprintln!("group 0, binding {binding}: {what:?}");
+    }
+    for (name, value) in variant.constants() {
+        eprintln!("override {name} = {value}");
+    }
+    Ok(variant.source())
+}
