@@ -26,6 +26,9 @@ pub enum KernelChoice {
     /// device was opened with.
     #[default]
     Auto,
+    /// The same with weights in f32 even where f16 would do: for a host whose own shaders read them so, as in a naga_oil
+    /// module.
+    SingleWeights,
     /// "Tiled" by WebGPU's default limits, without optional features.
     PlainTiled,
     /// "Each", without optional features.
@@ -147,7 +150,7 @@ fn choose(device: &Device, packed: &PackedModel, choice: KernelChoice) -> Result
             )));
         }
         KernelChoice::PlainTiled => plain,
-        KernelChoice::Auto => {
+        KernelChoice::Auto | KernelChoice::SingleWeights => {
             let fits = [best, plain].into_iter().find(|kernel| kernel.threads(packed.sizes).is_some());
             fits.unwrap_or(Kernel::Each)
         }

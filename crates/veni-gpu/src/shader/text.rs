@@ -35,8 +35,9 @@ pub fn field_bindings(group: u32, first: u32, weights: Weights) -> String {
         .collect()
 }
 
-/// [`field`] and its bindings as a naga_oil module `veni::field`: `#import veni::field::veni_radiance`. naga_oil knows no
-/// `enable f16;`, so the weights are f32: those of a decoder on a device without f16, or [`pack_model`](super::pack_model)'s.
+/// [`field`] and its bindings as a naga_oil module `veni::field`: `#import veni::field::veni_radiance`. naga_oil
+/// passes modules on in a form that has no f16, so the weights are f32: those of a decoder made with
+/// `KernelChoice::SingleWeights`, or [`pack_model`](super::pack_model)'s.
 pub fn field_module(sizes: Sizes, group: u32, first: u32) -> String {
     let bindings = field_bindings(group, first, Weights::Single);
     format!("#define_import_path veni::field\n\n{bindings}\n{}", field(sizes))

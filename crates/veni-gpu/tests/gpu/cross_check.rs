@@ -3,7 +3,7 @@
 use veni_core::model::Model;
 use veni_core::sphere::{CubeFace, Equirect, Frame};
 use veni_gpu::decoder::KernelChoice;
-use veni_gpu::shader::{Grid, Kernel};
+use veni_gpu::shader::{Grid, Kernel, Weights};
 use veni_gpu::{Bake, GpuDecoder};
 
 use crate::util::{self, agrees, difference, directions, filler, latent, say};
@@ -73,8 +73,16 @@ fn too_wide_to_be_tiled() {
 fn pretrained_model_with_all_the_device_has() {
     let Some(gpu) = util::rich() else { return };
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/veni-27.safetensors");
+    let model = Model::load(path).unwrap();
     // stored in f16: packed so where the device can
-    compare(&Model::load(path).unwrap(), 9, "pretrained", KernelChoice::Auto, &gpu);
+    for choice in [KernelChoice::Auto, KernelChoice::SingleWeights] {
+        compare(&model, 9, "pretrained", choice, &gpu);
+    }
+    let device = &gpu.opened.device;
+    let weights = |choice| GpuDecoder::with_kernel(device, &model, choice).unwrap().weights();
+    let f16 = device.features().contains(veni_gpu::wgpu::Features::SHADER_F16);
+    assert_eq!(weights(KernelChoice::Auto), if f16 { Weights::Half } else { Weights::Single });
+    assert_eq!(weights(KernelChoice::SingleWeights), Weights::Single);
 }
 
 /// Sums within subgroups, on adapters whose subgroups hold the groups of a narrow decoder.
