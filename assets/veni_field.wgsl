@@ -14,7 +14,7 @@ const VENI_BLOCK: u32 = 4u;
 //                  then per layer W1 and W2, one row per input feature
 //   veni_vectors   per layer gamma1, beta1, b1, b2, gamma2; then the three output rows and the output bias
 //   veni_latents   per latent: bias of the input projection with the first layer's attention, per layer beta2
-//                  with the next layer's attention, N x (x, y high parts, x, y low parts), (log exposure, 0, 0, 0)
+//                  with the next layer's attention, N x (x, y high parts, x, y low parts), (log exposure, VENI_COLUMNS, VENI_LAYERS, N + 2)
 //
 // The constants VENI_LATENTS (N), VENI_HIDDEN (h), VENI_LAYERS and VENI_COLUMNS are put in front of this file.
 
@@ -55,6 +55,12 @@ fn veni_latent(index: u32) -> u32 {
 // The vectors of a latent whose block begins at `latent`.
 fn veni_latent_vectors(latent: u32) -> u32 {
     return latent + VENI_COLUMNS * (VENI_LAYERS + 1u);
+}
+
+// VENI_COLUMNS, VENI_LAYERS and the number of inputs as data: a loop up to one of them stays a loop. Unrolled, the network
+// for one direction is some ten thousand lines that a compiler on the CPU works at for half a minute, for nothing.
+fn veni_counts(latent: u32) -> vec3u {
+    return vec3u(veni_latents[veni_latent_vectors(latent) + VENI_LATENTS].yzw);
 }
 
 fn veni_log_exposure(latent: u32) -> f32 {
@@ -154,30 +160,32 @@ fn veni_exp(log_radiance: vec3f) -> vec3f {
 // The same by any of the latents that were uploaded together.
 fn veni_log_radiance_of(index: u32, direction: vec3f) -> vec3f {
     let latent = veni_latent(index);
+    let counts = veni_counts(latent);
+    let columns = counts.x;
     var x: array<vec4f, VENI_COLUMNS>;
-    veni_project(latent, direction, &x);
-    for (var layer = 0u; layer < VENI_LAYERS; layer++) {
-        veni_normalise(layer, VENI_FIRST_GAMMA, &x);
-        for (var c = 0u; c < VENI_COLUMNS; c++) {
+    veni_project(latent, counts, direction, &x);
+    for (var layer = 0u; layer < counts.y; layer++) {
+        veni_normalise(layer, VENI_FIRST_GAMMA, columns, &x);
+        for (var c = 0u; c < columns; c++) {
             x[c] += veni_vectors[veni_vector(layer, VENI_FIRST_BETA) + c];
         }
         var y: array<vec4f, VENI_COLUMNS>;
-        for (var c = 0u; c < VENI_COLUMNS; c++) {
+        for (var c = 0u; c < columns; c++) {
             y[c] = veni_vectors[veni_vector(layer, VENI_FIRST_BIAS) + c];
         }
-        veni_multiply(veni_matrix_row(layer, 0u), &x, &y);
-        for (var c = 0u; c < VENI_COLUMNS; c++) {
+        veni_multiply(veni_matrix_row(layer, 0u), columns, &x, &y);
+        for (var c = 0u; c < columns; c++) {
             y[c] = max(y[c], vec4f());
             x[c] += veni_vectors[veni_vector(layer, VENI_SECOND_BIAS) + c];
         }
-        veni_multiply(veni_matrix_row(layer, 1u), &y, &x);
-        veni_normalise(layer, VENI_SECOND_GAMMA, &x);
-        for (var c = 0u; c < VENI_COLUMNS; c++) {
+        veni_multiply(veni_matrix_row(layer, 1u), columns, &y, &x);
+        veni_normalise(layer, VENI_SECOND_GAMMA, columns, &x);
+        for (var c = 0u; c < columns; c++) {
             x[c] += veni_latents[latent + (layer + 1u) * VENI_COLUMNS + c];
         }
     }
     var rgb = veni_vectors[veni_output(3u)].xyz;
-    for (var c = 0u; c < VENI_COLUMNS; c++) {
+    for (var c = 0u; c < columns; c++) {
         rgb.x += dot(x[c], veni_vectors[veni_output(0u) + c]);
         rgb.y += dot(x[c], veni_vectors[veni_output(1u) + c]);
         rgb.z += dot(x[c], veni_vectors[veni_output(2u) + c]);
@@ -186,13 +194,13 @@ fn veni_log_radiance_of(index: u32, direction: vec3f) -> vec3f {
 }
 
 // x = input bias + encoded direction times the input matrix.
-fn veni_project(latent: u32, direction: vec3f, x: ptr<function, array<vec4f, VENI_COLUMNS>>) {
-    for (var c = 0u; c < VENI_COLUMNS; c += VENI_BLOCK) {
+fn veni_project(latent: u32, counts: vec3u, direction: vec3f, x: ptr<function, array<vec4f, VENI_COLUMNS>>) {
+    for (var c = 0u; c < counts.x; c += VENI_BLOCK) {
         var sum0 = veni_latents[latent + c + 0u];
         var sum1 = veni_latents[latent + c + 1u];
         var sum2 = veni_latents[latent + c + 2u];
         var sum3 = veni_latents[latent + c + 3u];
-        for (var input = 0u; input < veni_inputs(); input++) {
+        for (var input = 0u; input < counts.z; input++) {
             let f = veni_encode(latent, input, direction);
             let row = 5u * input;
             sum0 += f.sin_once * veni_weight(row, c + 0u);
@@ -224,13 +232,13 @@ fn veni_project(latent: u32, direction: vec3f, x: ptr<function, array<vec4f, VEN
 }
 
 // y += x times the matrix that begins at a row.
-fn veni_multiply(first: u32, x: ptr<function, array<vec4f, VENI_COLUMNS>>, y: ptr<function, array<vec4f, VENI_COLUMNS>>) {
-    for (var c = 0u; c < VENI_COLUMNS; c += VENI_BLOCK) {
+fn veni_multiply(first: u32, columns: u32, x: ptr<function, array<vec4f, VENI_COLUMNS>>, y: ptr<function, array<vec4f, VENI_COLUMNS>>) {
+    for (var c = 0u; c < columns; c += VENI_BLOCK) {
         var sum0 = (*y)[c + 0u];
         var sum1 = (*y)[c + 1u];
         var sum2 = (*y)[c + 2u];
         var sum3 = (*y)[c + 3u];
-        for (var k = 0u; k < VENI_COLUMNS; k++) {
+        for (var k = 0u; k < columns; k++) {
             let v = (*x)[k];
             let row = first + 4u * k;
             sum0 += v.x * veni_weight(row, c + 0u);
@@ -258,21 +266,21 @@ fn veni_multiply(first: u32, x: ptr<function, array<vec4f, VENI_COLUMNS>>, y: pt
 }
 
 // x = gamma (x - mean) / sqrt(variance + 1e-5) over the features. Padding stays 0: its gamma is.
-fn veni_normalise(layer: u32, gamma: u32, x: ptr<function, array<vec4f, VENI_COLUMNS>>) {
+fn veni_normalise(layer: u32, gamma: u32, columns: u32, x: ptr<function, array<vec4f, VENI_COLUMNS>>) {
     var sum = vec4f();
-    for (var c = 0u; c < VENI_COLUMNS; c++) {
+    for (var c = 0u; c < columns; c++) {
         sum += (*x)[c];
     }
     let count = f32(VENI_HIDDEN);
     let mean = (sum.x + sum.y + sum.z + sum.w) / count;
     var squares = vec4f();
-    for (var c = 0u; c < VENI_COLUMNS; c++) {
+    for (var c = 0u; c < columns; c++) {
         let centred = ((*x)[c] - mean) * veni_real(c);
         squares += centred * centred;
     }
     let variance = (squares.x + squares.y + squares.z + squares.w) / count;
     let scale = inverseSqrt(variance + 1e-5);
-    for (var c = 0u; c < VENI_COLUMNS; c++) {
+    for (var c = 0u; c < columns; c++) {
         (*x)[c] = ((*x)[c] - mean) * (scale * veni_vectors[veni_vector(layer, gamma) + c]);
     }
 }

@@ -5,7 +5,7 @@
 //                  then per layer W1 and W2, one row per input feature
 //   veni_vectors   per layer gamma1, beta1, b1, b2, gamma2; then the three output rows and the output bias
 //   veni_latents   per latent: bias of the input projection with the first layer's attention, per layer beta2
-//                  with the next layer's attention, N x (x, y high parts, x, y low parts), (log exposure, 0, 0, 0)
+//                  with the next layer's attention, N x (x, y high parts, x, y low parts), (log exposure, VENI_COLUMNS, VENI_LAYERS, N + 2)
 //
 // The constants VENI_LATENTS (N), VENI_HIDDEN (h), VENI_LAYERS and VENI_COLUMNS are put in front of this file.
 
@@ -46,6 +46,12 @@ fn veni_latent(index: u32) -> u32 {
 // The vectors of a latent whose block begins at `latent`.
 fn veni_latent_vectors(latent: u32) -> u32 {
     return latent + VENI_COLUMNS * (VENI_LAYERS + 1u);
+}
+
+// VENI_COLUMNS, VENI_LAYERS and the number of inputs as data: a loop up to one of them stays a loop. Unrolled, the network
+// for one direction is some ten thousand lines that a compiler on the CPU works at for half a minute, for nothing.
+fn veni_counts(latent: u32) -> vec3u {
+    return vec3u(veni_latents[veni_latent_vectors(latent) + VENI_LATENTS].yzw);
 }
 
 fn veni_log_exposure(latent: u32) -> f32 {

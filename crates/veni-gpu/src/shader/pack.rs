@@ -77,7 +77,10 @@ pub fn pack_latent(sizes: Sizes, field: &Field, out: &mut Vec<f32>) {
         let ([hx, lx], [hy, ly]) = (split(*x), split(*y));
         data.extend([hx, hy, lx, ly]);
     }
-    data.extend([folded.log_exposure, 0.0, 0.0, 0.0]);
+    // the counts as data: see `veni_counts`
+    let counts = [sizes.columns(), sizes.layers, sizes.latents + 2].map(|n| n as f32);
+    data.push(folded.log_exposure);
+    data.extend(counts);
     *out = data;
 }
 
@@ -137,7 +140,7 @@ mod tests {
 
     #[test]
     fn splitting_loses_nothing_and_makes_products_exact() {
-        for v in [1.0f32, -3.25e-3, 65_535.996, 0.1, 1.0e-20, std::f32::consts::PI] {
+        for v in [1.0f32, -3.25e-3, 65_535.996, 0.1, 1.0e-12, std::f32::consts::PI] {
             let [high, low] = split(v);
             assert_eq!(high + low, v);
             assert_eq!(f64::from(high) * f64::from(high), f64::from(high * high));

@@ -57,6 +57,6 @@ fn order_of_stages() {
     ] {
         assert!(!passes(&gpu, TILED, from, to), "{from}");
     }
-    let each = "veni_normalise(layer, VENI_FIRST_GAMMA, &x);";
+    let each = "veni_normalise(layer, VENI_FIRST_GAMMA, columns, &x);";
     assert!(!passes(&gpu, Kernel::Each, each, ""));
 }
