@@ -27,7 +27,8 @@ impl GpuDecoder {
         let variant = self.variant(directions, store);
         let pipeline = self.pipelines.get(&self.device, &variant)?;
         let dispatches = variant.dispatches(request, latents.count);
-        let stride = self.device.limits().min_uniform_buffer_offset_alignment.max(Request::BYTES as u32);
+        let alignment = self.device.limits().min_uniform_buffer_offset_alignment;
+        let stride = (Request::BYTES as u32).next_multiple_of(alignment);
         let requests = self.requests(&dispatches, stride)?;
         let view = self.view(&bake.target)?;
         let target = match (&bake.target, &view) {
