@@ -72,7 +72,8 @@ fn helper(case: &Case, device: &Device) {
     let decoder = field::build(case, "", device);
     let (image, mask, start) = (case.data("in.image"), case.data("in.mask"), case.data("in.latent0"));
     let grid = Equirect::new(image.shape[1], image.shape[0]);
-    let target = FitTarget { grid, directions: None, images: &[&image.values], masks: Some(&[&mask.values]) };
+    let (images, masks) = ([image.values.as_slice()], [mask.values.as_slice()]);
+    let target = FitTarget { masks: Some(&masks), ..FitTarget::panoramas(grid, &images) };
     let last = number(case, "max_steps") as u64;
     let reference = FitConfig::reference_helper(number(case, "lr"), number(case, "lr_final"), last);
     let after = |steps| {
@@ -111,7 +112,7 @@ pub(crate) fn evaluate(case: &Case, device: &Device) -> FitResult {
     let [batch, height, width, 3] = images.shape[..] else { panic!("images of shape {:?}", images.shape) };
     let views: Vec<_> = images.values.chunks_exact(3 * width * height).collect();
     let grid = Equirect::new(width, height);
-    let target = FitTarget { grid, directions: None, images: &views, masks: None };
+    let target = FitTarget::panoramas(grid, &views);
     let mut start = latents(case.data("param.eval_mu"), batch);
     let scales = case.get("param.eval_scale");
     if let Some(scales) = scales {

@@ -100,7 +100,7 @@ impl Reconstruction {
             let images: Vec<_> =
                 items.iter().map(|i| averaged(dataset.grid(), &i.log_radiance, factor)).collect();
             let images: Vec<_> = images.iter().map(Vec::as_slice).collect();
-            let target = FitTarget { grid, directions: None, images: &images, masks: None };
+            let target = FitTarget::panoramas(grid, &images);
             latents.extend(fit(&veni.decoder, &target, start, config)?.latents);
         }
         Ok(Self::of_latents(veni, dataset, &latents, alignment))

@@ -12,13 +12,14 @@ use super::weights::{Matrix, PANEL, Weights};
 use super::{Folded, math};
 
 /// Vectors per row.
-const VECTORS: usize = 3;
+pub(super) const VECTORS: usize = 3;
 /// Interleaved partial sums of a layer norm: enough to hide the latency of addition.
 pub(super) const PARTIAL: usize = 4;
 /// ε of layer norm.
 pub(super) const EPSILON: f32 = 1e-5;
 
-type Row<S> = [<S as Simd>::f32s; VECTORS];
+/// A feature of a block: one value per direction.
+pub(super) type Row<S> = [<S as Simd>::f32s; VECTORS];
 
 /// Work for one thread: any number of directions, one after the other in blocks.
 pub(super) struct Blocks<'a> {
@@ -67,7 +68,7 @@ impl WithSimd for Blocks<'_> {
 
 /// Directions to rows x, y, z and √(x² + y²). A short last block keeps finite numbers in its idle lanes.
 #[inline(always)]
-fn scatter<S: Simd>(simd: S, directions: &[[f32; 3]], rows: &mut [Row<S>]) {
+pub(super) fn scatter<S: Simd>(simd: S, directions: &[[f32; 3]], rows: &mut [Row<S>]) {
     let lanes = VECTORS * S::F32_LANES;
     let flat: &mut [f32] = bytemuck::cast_slice_mut(rows.as_flattened_mut());
     for (i, direction) in directions.iter().enumerate() {
@@ -112,7 +113,7 @@ fn network<S: Simd>(
 
 /// Five features of each directional input: sine and cosine at frequencies 1 and 4, and the input itself.
 #[inline(always)]
-fn encode<S: Simd>(
+pub(super) fn encode<S: Simd>(
     simd: S,
     folded: &Folded,
     inputs: std::ops::Range<usize>,
@@ -154,7 +155,7 @@ pub(super) fn inner_product<S: Simd>(simd: S, z: [S::f32s; 2], d: [S::f32s; 2]) 
 
 /// y = W x + b, with ADD y + W x + b, with RELU max(0, ·). Bias has a value for every row of whole panels.
 #[inline(always)]
-fn product<S: Simd, const ADD: bool, const RELU: bool>(
+pub(super) fn product<S: Simd, const ADD: bool, const RELU: bool>(
     simd: S,
     weight: &Matrix,
     bias: &[f32],
@@ -210,14 +211,9 @@ fn tile<S: Simd, const ROWS: usize, const FROM: usize, const ADD: bool, const RE
 /// x ← γ (x − mean)/√(variance + ε) + shift over the rows.
 #[inline(always)]
 fn normalise<S: Simd>(simd: S, x: &mut [Row<S>], gamma: &[f32], shift: &[f32]) {
-    let count = simd.splat_f32s(x.len() as f32);
-    let mut mean = sum::<S, false>(simd, x, [simd.splat_f32s(0.0); VECTORS]);
-    for mean in &mut mean {
-        *mean = simd.div_f32s(*mean, count);
-    }
-    let mut scale = sum::<S, true>(simd, x, mean);
+    let (mean, mut scale) = moments(simd, x);
     for scale in &mut scale {
-        let variance = simd.add_f32s(simd.div_f32s(*scale, count), simd.splat_f32s(EPSILON));
+        let variance = simd.add_f32s(*scale, simd.splat_f32s(EPSILON));
         *scale = simd.div_f32s(simd.splat_f32s(1.0), simd.sqrt_f32s(variance));
     }
     for ((row, gamma), shift) in x.iter_mut().zip(gamma).zip(shift) {
@@ -227,6 +223,21 @@ fn normalise<S: Simd>(simd: S, x: &mut [Row<S>], gamma: &[f32], shift: &[f32]) {
             row[v] = simd.mul_add_e_f32s(centred, simd.mul_f32s(scale[v], gamma), shift);
         }
     }
+}
+
+/// Mean and variance over the rows.
+#[inline(always)]
+pub(super) fn moments<S: Simd>(simd: S, x: &[Row<S>]) -> (Row<S>, Row<S>) {
+    let count = simd.splat_f32s(x.len() as f32);
+    let mut mean = sum::<S, false>(simd, x, [simd.splat_f32s(0.0); VECTORS]);
+    for mean in &mut mean {
+        *mean = simd.div_f32s(*mean, count);
+    }
+    let mut variance = sum::<S, true>(simd, x, mean);
+    for variance in &mut variance {
+        *variance = simd.div_f32s(*variance, count);
+    }
+    (mean, variance)
 }
 
 /// Σ x over the rows, with SQUARES Σ (x − mean)², in [`PARTIAL`] interleaved sums.

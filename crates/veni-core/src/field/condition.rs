@@ -26,6 +26,24 @@ impl Invariant {
             (w * w * alpha * r * r * left) as f32
         })
     }
+
+    /// (1/r) daₑ/dr: what a gradient by aₑ is multiplied by, along with x and y, to be one by x and y. Smooth at
+    /// r = 0. Below the guard of the reference forms |k| counts as a constant, as there.
+    pub(super) fn slope(&self, r: f64) -> [f64; 2] {
+        let w = self.scale;
+        std::array::from_fn(|e| {
+            let (alpha, beta) = (self.alpha[e], self.beta[e]);
+            let k = (w * beta * r).abs();
+            let below = |guard: f64| if k > guard { 2.0 - 3.0 * k } else { 2.0 - 4.0 * k * k / guard };
+            let left = match self.form {
+                _ if alpha * beta >= 0.0 => 2.0,
+                VnReluForm::Projection => 0.0,
+                VnReluForm::Reference => below(1e-3),
+                VnReluForm::ReferenceNormGuard => below(1e-6),
+            };
+            w * w * alpha * left
+        })
+    }
 }
 
 /// out(value(c)) of every layer.

@@ -15,6 +15,7 @@ mod aligned;
 mod bake;
 mod block;
 mod condition;
+mod gradient;
 mod math;
 mod rate;
 mod single;
@@ -27,6 +28,7 @@ use crate::model::Model;
 use crate::{Error, Result};
 use weights::Weights;
 
+pub use gradient::Gradient;
 pub use rate::multiply_add_rate;
 
 /// Largest |z_x|, |z_y| of a latent. Beyond it f32 does not resolve the phase of the encoding; trained codes

@@ -1,6 +1,9 @@
 //! The decoder's weights in the order the kernels read them. Packed once per model.
 
+use std::sync::OnceLock;
+
 use super::aligned::Aligned;
+use super::gradient::Transposed;
 use crate::model::{Model, Tensor, VnReluForm};
 
 /// Outputs per panel: what one register tile computes.
@@ -33,6 +36,14 @@ impl Matrix {
     fn new(tensor: &Tensor) -> Self {
         let [inputs, outputs] = [tensor.shape[0], tensor.shape[1]];
         Self::pack(inputs, outputs, |k| &tensor.data[k * outputs..][..outputs])
+    }
+
+    /// The transpose of the first `outputs` columns.
+    pub(super) fn transposed(&self, outputs: usize) -> Self {
+        let at = |k: usize, o: usize| self.rows()[o / PANEL * self.inputs + k][o % PANEL];
+        let rows: Vec<Vec<f32>> =
+            (0..outputs).map(|o| (0..self.inputs).map(|k| at(k, o)).collect()).collect();
+        Self::pack(outputs, self.inputs, |o| &rows[o])
     }
 
     /// Panels of `inputs` rows each.
@@ -98,6 +109,8 @@ pub(super) struct Weights {
     pub(super) layers: Vec<Layer>,
     pub(super) output: Matrix,
     pub(super) output_bias: Vec<f32>,
+    /// Made when the first gradient is asked for.
+    transposed: OnceLock<Transposed>,
 }
 
 impl Weights {
@@ -141,7 +154,13 @@ impl Weights {
             layers: (0..config.decoder.layers).map(layer).collect(),
             output: Matrix::new(tensor("output.weight")),
             output_bias: padded("output.bias"),
+            transposed: OnceLock::new(),
         }
+    }
+
+    /// The matrices the other way round.
+    pub(super) fn transposed(&self) -> &Transposed {
+        self.transposed.get_or_init(|| Transposed::new(self))
     }
 
     /// h rounded up to whole panels.

@@ -1,6 +1,7 @@
 //! The field against the golden files, against a plain f64 implementation, and against its symmetries.
 
 mod golden;
+mod gradient;
 mod properties;
 mod reference;
 

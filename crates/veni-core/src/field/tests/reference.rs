@@ -6,7 +6,7 @@ use crate::latent::{Latent, Prior};
 use crate::model::Model;
 
 /// Plain access to a model's tensors.
-struct Plain<'a>(&'a Model);
+pub(super) struct Plain<'a>(pub(super) &'a Model);
 
 impl Plain<'_> {
     fn values(&self, name: &str) -> Vec<f64> {
@@ -49,7 +49,7 @@ impl Plain<'_> {
         [one, two, f64::from(z)]
     }
 
-    fn log_radiance(&self, latent: &Latent, direction: [f32; 3]) -> [f64; 3] {
+    pub(super) fn log_radiance(&self, latent: &Latent, direction: [f32; 3]) -> [f64; 3] {
         self.log_radiance_with(latent, direction, |v, d, frequency| {
             let p = f64::from(v[0]) * f64::from(d[0]) + f64::from(v[1]) * f64::from(d[1]);
             std::f64::consts::TAU * p * frequency

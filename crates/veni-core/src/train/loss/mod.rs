@@ -32,7 +32,7 @@ pub enum LossForm {
 }
 
 /// The terms and their weights. A weight that is 0 for ever costs nothing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LossConfig {
     /// Which form all terms take.

@@ -1,0 +1,77 @@
+//! The gradient of a loss on log radiance by the latent, in closed form: forward and backward of the folded
+//! network, block by block, with nothing kept beyond a block.
+//!
+//! With the decoder fixed, the latent reaches the network in three places: the products zᵢ,xy · d_xy of the
+//! directional input, the bias of the input projection, and one vector per layer. A block of directions goes
+//! forward, its loss is taken, and it goes back while its activations are still in the second-level cache; what
+//! is summed over all directions are those three gradients, a few hundred numbers. The rest of the chain (the
+//! attention's two linear maps and the invariants) is taken once.
+//!
+//! Sums over directions run in a fixed order: the same bits whatever the number of threads.
+
+mod backward;
+mod chain;
+mod transposed;
+
+use rayon::prelude::*;
+
+use super::Field;
+use super::aligned::Aligned;
+use backward::{Backward, Sums};
+
+pub(super) use transposed::Transposed;
+
+/// Fewest directions of one task: a few blocks, so that all cores finish together.
+const TASK: usize = 192;
+/// Most tasks: each leaves sums of its own.
+const TASKS: usize = 256;
+
+/// A loss and its gradient by the latent it was taken at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gradient {
+    /// The sum of what the loss gave for every direction.
+    pub loss: f64,
+    /// By the N latent vectors [x, y, z].
+    pub vectors: Vec<[f32; 3]>,
+    /// By the log exposure.
+    pub log_exposure: f32,
+}
+
+impl Field {
+    /// The gradient of Σᵢ ℓᵢ by the latent. `loss(i, p)` gets the log radiance p (r, g, b, exposure included) in
+    /// direction i and gives ℓᵢ and its derivatives by p; a loss that looks at the whole image is given as
+    /// those derivatives, computed beforehand from [`Field::log_radiance_batch`].
+    ///
+    /// Costs the multiply-adds of two [`Field::log_radiance_batch`], on all cores; memory does not grow with
+    /// the number of directions. p differs from that function's by rounding.
+    pub fn gradient(
+        &self,
+        directions: &[[f32; 3]],
+        loss: impl Fn(usize, [f32; 3]) -> (f64, [f32; 3]) + Sync,
+    ) -> Gradient {
+        let (weights, folded) = (&*self.weights, &*self.folded);
+        let transposed = weights.transposed();
+        let task = directions.len().div_ceil(TASKS).next_multiple_of(TASK).max(TASK);
+        let tasks = directions.par_chunks(task).enumerate();
+        let parts = tasks.map_init(Aligned::default, |scratch, (at, directions)| {
+            let mut sums = Sums::new(weights);
+            let (loss, first) = (&loss, at * task);
+            pulp::Arch::new().dispatch(Backward {
+                weights,
+                transposed,
+                folded,
+                directions,
+                loss: &|i, p| loss(first + i, p),
+                sums: &mut sums,
+                scratch,
+            });
+            sums
+        });
+        let mut total = Sums::new(weights);
+        // collected in order, added in order
+        for part in parts.collect::<Vec<_>>() {
+            total.add(&part);
+        }
+        chain::to_latent(weights, folded, &total)
+    }
+}

@@ -1,0 +1,155 @@
+//! What is minimised, and how.
+
+use serde::{Deserialize, Serialize};
+
+use crate::train::loss::LossConfig;
+use crate::train::schedule::{LearningRate, Ramp};
+use crate::{Error, Result};
+
+/// What is minimised, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitConfig {
+    /// Adam updates, at most.
+    pub steps: u64,
+    /// Learning rate over the updates, from step 0.
+    pub learning_rate: LearningRate,
+    /// Adam's ε. The authors' 1e-15 makes every coordinate move by the full rate at first.
+    pub epsilon: f64,
+    /// What is compared.
+    pub objective: Objective,
+    /// Weight of ½ mean |z|² over the latent vectors, which pulls towards the standard normal prior; 0: off.
+    pub prior: f64,
+    /// Whether each latent's log exposure is optimised too.
+    pub free_exposure: bool,
+    /// When to stop before `steps`; absent: never.
+    #[serde(default)]
+    pub plateau: Option<Plateau>,
+}
+
+/// Stops a fit that no longer gets better.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plateau {
+    /// So many updates without an improvement end the fit.
+    pub patience: u64,
+    /// A loss counts as better if it is below the best so far by this fraction of it.
+    pub improvement: f64,
+}
+
+/// The part of the loss that looks at the image. P is the prediction, I the image, both log radiance; ω is a
+/// pixel's area (solid angle), m its mask.
+///
+/// The first four look at each pixel alone: then a step costs one pass forward and one backward, fused. The
+/// others need the whole image before they know any pixel's gradient: one more pass forward.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Objective {
+    /// Σ ω m (P − I)²/Σ ω m.
+    LogError,
+    /// Σ ω m (√((P − I)² + δ²) − δ)/Σ ω m with δ = 0.1: like |P − I|, so that a sun or a lamp that the decoder
+    /// cannot follow does not drag the rest along.
+    LogAbsolute,
+    /// Σ ω m (D(P) − D(I))²/Σ ω m + `log` · [`Objective::LogError`], D(x) = the sRGB curve of
+    /// min(eˣ/white, 1), white = the 98 % quantile of the image: what the LDR scores see.
+    Display {
+        /// Weight of the log error, which keeps what the display clips in place.
+        log: f64,
+    },
+    /// mean((m P − m I)²) over all pixels alike: the authors' helper.
+    ReferenceLogError,
+    /// 1 − mean cos(P, I) + mean(R²) − mean(R)², R = P − I, over all pixels of all images alike (RENI++);
+    /// with a free exposure, + mean(R²). It takes no mask.
+    CosineScaleInvariant,
+    /// Any mixture of the training losses, on a whole panorama without masks.
+    Terms(LossConfig),
+}
+
+impl FitConfig {
+    /// From any start to convergence with solid-angle weights: for evaluation and for use.
+    pub fn thorough() -> Self {
+        Self {
+            steps: 400,
+            learning_rate: exponential(5e-2, 2e-3, 400),
+            epsilon: 1e-8,
+            objective: Objective::LogError,
+            prior: 1e-3,
+            free_exposure: false,
+            plateau: None,
+        }
+    }
+
+    /// As [`FitConfig::thorough`], for what a viewer sees: the best LDR scores.
+    pub fn display() -> Self {
+        Self { objective: Objective::Display { log: 0.01 }, prior: 1e-4, ..Self::thorough() }
+    }
+
+    /// The authors' helper (figures, uniqueness): `steps` steps from `rate` to `last`.
+    pub fn reference_helper(rate: f64, last: f64, steps: u64) -> Self {
+        Self {
+            steps,
+            learning_rate: exponential(rate, last, steps),
+            epsilon: 1e-15,
+            objective: Objective::ReferenceLogError,
+            prior: 0.0,
+            free_exposure: false,
+            plateau: None,
+        }
+    }
+
+    /// RENI++'s evaluation: 2500 steps from latent 0, without random rays.
+    pub fn reni_evaluation() -> Self {
+        Self {
+            steps: 2500,
+            learning_rate: exponential(1e-1, 1e-7, 2500),
+            epsilon: 1e-15,
+            objective: Objective::CosineScaleInvariant,
+            prior: 0.0,
+            free_exposure: false,
+            plateau: None,
+        }
+    }
+
+    /// The same fit in another number of steps: rates that fell until the old last step fall until the new one.
+    #[must_use]
+    pub fn in_steps(self, steps: u64) -> Self {
+        let mut learning_rate = self.learning_rate;
+        match &mut learning_rate {
+            LearningRate::Cosine { steps: end, .. } | LearningRate::Exponential { steps: end, .. }
+                if *end == self.steps =>
+            {
+                *end = steps;
+            }
+            _ => {}
+        }
+        Self { steps, learning_rate, ..self }
+    }
+
+    /// Checks what types cannot.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the setting, its value and what is allowed.
+    pub fn check(&self) -> Result<()> {
+        let mut numbers = vec![("prior", self.prior, true), ("epsilon", self.epsilon, false)];
+        for step in [0, self.steps / 2, self.steps] {
+            numbers.push(("learning_rate", self.learning_rate.at(step), true));
+        }
+        if let Some(plateau) = self.plateau {
+            numbers.push(("plateau.improvement", plateau.improvement, true));
+        }
+        if let Objective::Display { log } = self.objective {
+            numbers.push(("objective.display.log", log, true));
+        }
+        for (name, value, zero) in numbers {
+            if !(value.is_finite() && (value > 0.0 || zero && value == 0.0)) {
+                let least = if zero { "at least 0" } else { "above 0" };
+                return Err(Error::invalid(format!("{name} = {value}: must be finite and {least}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn exponential(rate: f64, last: f64, steps: u64) -> LearningRate {
+    LearningRate::Exponential { rate, last, steps, warm_up: 0, before: 0.0, ramp: Ramp::Cosine }
+}

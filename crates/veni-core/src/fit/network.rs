@@ -1,0 +1,235 @@
+//! The two ways to run a decoder forward and backward.
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor, TensorData};
+
+use super::pixel::PixelLoss;
+use super::whole::WholeLoss;
+use crate::field;
+use crate::latent::Latent;
+use crate::vae;
+use crate::{Error, Result};
+
+/// A decoder under which latents are optimised; its weights are constants.
+#[derive(Clone, Copy, Debug)]
+pub enum FitDecoder<'a> {
+    /// The decoder folded per latent, with its gradient in closed form: the fast way.
+    Folded(&'a field::Decoder),
+    /// The decoder as a graph of tensors on its device: every kind of decoder, every floating-point type.
+    Graph(&'a vae::Decoder),
+}
+
+impl<'a> From<&'a field::Decoder> for FitDecoder<'a> {
+    fn from(decoder: &'a field::Decoder) -> Self {
+        Self::Folded(decoder)
+    }
+}
+
+impl<'a> From<&'a vae::Decoder> for FitDecoder<'a> {
+    fn from(decoder: &'a vae::Decoder) -> Self {
+        Self::Graph(decoder)
+    }
+}
+
+impl FitDecoder<'_> {
+    /// N, the number of latent vectors.
+    pub fn latent_vectors(self) -> usize {
+        match self {
+            Self::Folded(decoder) => decoder.latent_vectors(),
+            Self::Graph(decoder) => decoder.latent_vectors(),
+        }
+    }
+
+    /// Where losses over whole images are computed.
+    pub(super) fn device(self) -> Device {
+        match self {
+            Self::Folded(_) => Device::flex().autodiff(),
+            Self::Graph(decoder) => decoder.output.bias.val().device().without_autodiff().autodiff(),
+        }
+    }
+}
+
+/// The images' part of the objective.
+#[derive(Debug)]
+pub(super) enum ImageLoss<'a> {
+    /// One loss per image.
+    Pixels(Vec<PixelLoss<'a>>),
+    /// All images together.
+    Whole(WholeLoss),
+}
+
+/// The losses at some latents, and their slopes.
+#[derive(Debug, Default)]
+pub(super) struct Evaluation {
+    /// Per image; of a loss over all images together its value, as often.
+    pub(super) losses: Vec<f64>,
+    /// By the coordinates of all latents, of the sum of the images' losses.
+    pub(super) vectors: Vec<f64>,
+    /// By the log exposures.
+    pub(super) exposures: Vec<f64>,
+}
+
+/// A decoder with the directions it is asked in.
+#[derive(Debug)]
+pub(super) enum Network<'a> {
+    Folded { decoder: &'a field::Decoder, directions: Vec<[f32; 3]>, device: Device },
+    Graph { decoder: Box<vae::Decoder>, directions: Tensor<2>, device: Device },
+}
+
+impl<'a> Network<'a> {
+    pub(super) fn new(decoder: FitDecoder<'a>, directions: Vec<[f32; 3]>) -> Self {
+        let device = decoder.device();
+        match decoder {
+            FitDecoder::Folded(decoder) => Self::Folded { decoder, directions, device },
+            FitDecoder::Graph(decoder) => {
+                let shape = [directions.len(), 3];
+                let directions = TensorData::new(directions.into_flattened(), shape);
+                Self::Graph {
+                    // constants on the graph's device: no gradient is spent on weights
+                    decoder: Box::new(decoder.clone().fork(&device).freeze()),
+                    directions: Tensor::from_data(directions, &device),
+                    device,
+                }
+            }
+        }
+    }
+
+    /// The losses and their slopes at `latents`.
+    pub(super) fn evaluate(&self, latents: &[Latent], loss: &ImageLoss<'_>) -> Result<Evaluation> {
+        match self {
+            Self::Folded { decoder, directions, device } => {
+                let fields: Vec<_> = latents.iter().map(|z| decoder.condition(z)).collect::<Result<_>>()?;
+                let found: Vec<_> = match loss {
+                    ImageLoss::Pixels(images) => fields
+                        .iter()
+                        .zip(images)
+                        .map(|(field, image)| {
+                            field.gradient(directions, |i, p| {
+                                let (value, slope) = image.at(i, p.map(f64::from));
+                                (value, slope.map(|s| s as f32))
+                            })
+                        })
+                        .collect(),
+                    ImageLoss::Whole(whole) => {
+                        let prediction = decoded(&fields, directions, whole.shape(), device).require_grad();
+                        let value = whole.of(prediction.clone());
+                        let gradients = value.clone().backward();
+                        let slopes = numbers(prediction.grad(&gradients).ok_or_else(unconnected)?);
+                        let value = f64::from(value.into_scalar::<f32>());
+                        let slopes = slopes.as_chunks::<3>().0.chunks_exact(directions.len());
+                        let run = |(field, slopes): (&field::Field, &[[f64; 3]])| {
+                            let mut g = field.gradient(directions, |i, _| (0.0, slopes[i].map(|s| s as f32)));
+                            g.loss = value;
+                            g
+                        };
+                        fields.iter().zip(slopes).map(run).collect()
+                    }
+                };
+                let flat = |g: &field::Gradient| g.vectors.as_flattened().to_vec();
+                Ok(Evaluation {
+                    losses: found.iter().map(|g| g.loss).collect(),
+                    vectors: found.iter().flat_map(flat).map(f64::from).collect(),
+                    exposures: found.iter().map(|g| f64::from(g.log_exposure)).collect(),
+                })
+            }
+            Self::Graph { device, .. } => {
+                let (z, s) =
+                    (vectors(latents, device).require_grad(), exposures(latents, device).require_grad());
+                let prediction = self.forward(z.clone(), s.clone());
+                let (losses, gradients) = match loss {
+                    ImageLoss::Whole(whole) => {
+                        let value = whole.of(prediction.reshape(whole.shape()));
+                        let gradients = value.clone().backward();
+                        (vec![f64::from(value.into_scalar::<f32>()); latents.len()], gradients)
+                    }
+                    ImageLoss::Pixels(images) => {
+                        let (losses, slopes) = slopes(&numbers(prediction.clone()), images);
+                        let slopes = Tensor::from_data(TensorData::new(slopes, prediction.dims()), device);
+                        (losses, (prediction * slopes).sum().backward())
+                    }
+                };
+                Ok(Evaluation {
+                    losses,
+                    vectors: numbers(z.grad(&gradients).ok_or_else(unconnected)?),
+                    exposures: numbers(s.grad(&gradients).ok_or_else(unconnected)?),
+                })
+            }
+        }
+    }
+
+    /// The loss of each image alone.
+    pub(super) fn losses(&self, latents: &[Latent], loss: &ImageLoss<'_>) -> Result<Vec<f64>> {
+        let prediction: Tensor<3> = match self {
+            Self::Folded { decoder, directions, device } => {
+                let fields: Vec<_> = latents.iter().map(|z| decoder.condition(z)).collect::<Result<_>>()?;
+                decoded(&fields, directions, [latents.len(), 1, directions.len(), 3], device).squeeze_dim(1)
+            }
+            Self::Graph { device, .. } => self.forward(vectors(latents, device), exposures(latents, device)),
+        };
+        Ok(match loss {
+            ImageLoss::Whole(whole) => whole.each(&prediction.reshape(whole.shape())),
+            ImageLoss::Pixels(images) => slopes(&numbers(prediction), images).0,
+        })
+    }
+
+    /// Log radiance [B, R, 3]; of the graph only.
+    fn forward(&self, z: Tensor<3>, s: Tensor<3>) -> Tensor<3> {
+        match self {
+            Self::Graph { decoder, directions, .. } => decoder.forward(z, directions.clone()) + s,
+            Self::Folded { .. } => unreachable!("a folded decoder has no graph"),
+        }
+    }
+}
+
+fn unconnected() -> Error {
+    Error::invalid("the loss does not depend on the latents")
+}
+
+/// [B, N, 3].
+fn vectors(latents: &[Latent], device: &Device) -> Tensor<3> {
+    let flat: Vec<f32> = latents.iter().flat_map(|z| z.vectors.as_flattened()).copied().collect();
+    let shape = [latents.len(), flat.len() / (3 * latents.len()), 3];
+    Tensor::from_data(TensorData::new(flat, shape), device)
+}
+
+/// [B, 1, 1].
+fn exposures(latents: &[Latent], device: &Device) -> Tensor<3> {
+    let values: Vec<f32> = latents.iter().map(|z| z.log_exposure).collect();
+    Tensor::from_data(TensorData::new(values, [latents.len(), 1, 1]), device)
+}
+
+fn decoded(
+    fields: &[field::Field],
+    directions: &[[f32; 3]],
+    shape: [usize; 4],
+    device: &Device,
+) -> Tensor<4> {
+    let mut all = vec![[0.0; 3]; fields.len() * directions.len()];
+    for (field, out) in fields.iter().zip(all.chunks_exact_mut(directions.len())) {
+        field.log_radiance_batch(directions, out);
+    }
+    Tensor::from_data(TensorData::new(all.into_flattened(), shape), device)
+}
+
+fn numbers<const D: usize>(tensor: Tensor<D>) -> Vec<f64> {
+    tensor.into_data().convert::<f64>().try_into_vec().expect("just converted to f64")
+}
+
+/// Each image's loss, and its slopes by all predictions.
+fn slopes(prediction: &[f64], images: &[PixelLoss<'_>]) -> (Vec<f64>, Vec<f64>) {
+    let mut slopes = Vec::with_capacity(prediction.len());
+    let pixels = prediction.as_chunks::<3>().0;
+    let losses = images.iter().zip(pixels.chunks_exact(pixels.len() / images.len()));
+    let losses = losses.map(|(image, pixels)| {
+        pixels
+            .iter()
+            .enumerate()
+            .map(|(i, p)| {
+                let (value, slope) = image.at(i, *p);
+                slopes.extend(slope);
+                value
+            })
+            .sum()
+    });
+    (losses.collect(), slopes)
+}

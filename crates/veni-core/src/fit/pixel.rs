@@ -1,0 +1,103 @@
+//! Losses that look at each pixel alone, with their derivatives, in f64.
+
+use super::config::Objective;
+use super::target::FitTarget;
+use crate::panorama::tonemap;
+
+/// Where the absolute error turns from a parabola into a line, in log radiance.
+const ROUNDING: f64 = 0.1;
+
+/// One image's loss: a sum over pixels.
+#[derive(Debug)]
+pub(super) struct PixelLoss<'a> {
+    objective: Objective,
+    image: &'a [f32],
+    clipped: Option<&'a [bool]>,
+    /// Per pixel; 0 where nothing is known.
+    weights: Vec<f64>,
+    /// Log of the white point.
+    white: f64,
+    /// The image as shown, if that is compared.
+    shown: Vec<f64>,
+}
+
+impl<'a> PixelLoss<'a> {
+    /// For image `b`; nothing if the objective looks at more than a pixel.
+    pub(super) fn new(objective: Objective, target: &FitTarget<'a>, b: usize, areas: &[f64]) -> Option<Self> {
+        if matches!(objective, Objective::CosineScaleInvariant | Objective::Terms(_)) {
+            return None;
+        }
+        let image = target.images[b];
+        let mask = target.masks.map(|masks| masks[b]);
+        let pixels = areas.len() as f64;
+        let counts = |p: usize| mask.map_or(1.0, |m| f64::from(m[p]));
+        let weights: Vec<f64> = match objective {
+            Objective::ReferenceLogError => (0..areas.len()).map(|p| counts(p).powi(2) / pixels).collect(),
+            _ => {
+                let total: f64 = areas.iter().enumerate().map(|(p, area)| area * counts(p)).sum();
+                areas.iter().enumerate().map(|(p, area)| area * counts(p) / total).collect()
+            }
+        };
+        let (white, shown) = match objective {
+            Objective::Display { .. } => {
+                let white = white(image, &weights);
+                (white, image.iter().map(|i| display(f64::from(*i) - white).0).collect())
+            }
+            _ => (0.0, Vec::new()),
+        };
+        Some(Self { objective, image, clipped: target.clipped.map(|c| c[b]), weights, white, shown })
+    }
+
+    /// The pixel's part of the loss for log radiance `prediction`, and its derivatives.
+    pub(super) fn at(&self, pixel: usize, prediction: [f64; 3]) -> (f64, [f64; 3]) {
+        // the mean over the channels
+        let weight = self.weights[pixel] / 3.0;
+        if weight == 0.0 {
+            return (0.0, [0.0; 3]);
+        }
+        let (mut loss, mut slopes) = (0.0, [0.0; 3]);
+        for c in 0..3 {
+            let k = 3 * pixel + c;
+            let (p, i) = (prediction[c], f64::from(self.image[k]));
+            let error = p - i;
+            if error > 0.0 && self.clipped.is_some_and(|clipped| clipped[k]) {
+                continue;
+            }
+            let (value, slope) = match self.objective {
+                Objective::LogAbsolute => {
+                    let root = error.hypot(ROUNDING);
+                    (root - ROUNDING, error / root)
+                }
+                Objective::Display { log } => {
+                    let (shown, by) = display(p - self.white);
+                    let difference = shown - self.shown[k];
+                    (difference * difference + log * error * error, 2.0 * difference * by + 2.0 * log * error)
+                }
+                _ => (error * error, 2.0 * error),
+            };
+            loss += weight * value;
+            slopes[c] = weight * slope;
+        }
+        (loss, slopes)
+    }
+}
+
+/// The log of the 98 % quantile of an image's known values.
+fn white(image: &[f32], weights: &[f64]) -> f64 {
+    let known = image.chunks_exact(3).zip(weights).filter(|(_, w)| **w > 0.0);
+    let radiance: Vec<f32> = known.flat_map(|(rgb, _)| rgb.iter().map(|v| v.exp())).collect();
+    f64::from(tonemap::quantile(&radiance, 0.98)).ln()
+}
+
+/// The sRGB curve of min(eˣ, 1), and its derivative by x.
+fn display(x: f64) -> (f64, f64) {
+    if x >= 0.0 {
+        return (1.0, 0.0);
+    }
+    let linear = x.exp();
+    if linear < 0.003_130_8 {
+        return (12.92 * linear, 12.92 * linear);
+    }
+    let curved = 1.055 * linear.powf(1.0 / 2.4);
+    (curved - 0.055, curved / 2.4)
+}

@@ -1,0 +1,58 @@
+//! Several starts for one image: the best of them, and how much they disagree.
+
+use super::{FitConfig, FitDecoder, FitResult, FitTarget, fit_watched};
+use crate::Result;
+use crate::data::random::{Purpose, stream};
+use crate::latent::{Latent, Prior};
+
+/// The best of several fits of one image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Best {
+    /// The latent with the lowest loss.
+    pub latent: Latent,
+    /// Its loss.
+    pub loss: f64,
+    /// The latents of all starts, in their order.
+    pub all: Vec<Latent>,
+    /// Their losses.
+    pub losses: Vec<f64>,
+}
+
+/// `count` latents drawn from `prior`, at `log_exposure`. The same seed gives the same starts.
+pub fn random_starts(prior: &Prior, log_exposure: f32, count: usize, seed: u64) -> Vec<Latent> {
+    let draw = |k: usize| {
+        let mut rng = stream(seed, Purpose::Fit, k as u64, 0);
+        Latent { log_exposure, ..Latent::new(Latent::sample(prior, &mut rng).vectors) }
+    };
+    (0..count).map(draw).collect()
+}
+
+/// Fits the single image of `target` from every start, and keeps the best. `watch` gets the number of updates
+/// made, all starts together, and the loss.
+///
+/// # Errors
+/// As [`fit`](super::fit).
+///
+/// # Panics
+/// If there is no start, or not exactly one image.
+pub fn best_of<'a>(
+    decoder: impl Into<FitDecoder<'a>>,
+    target: &FitTarget<'_>,
+    starts: &[Latent],
+    config: &FitConfig,
+    watch: &mut dyn FnMut(u64, f64),
+) -> Result<Best> {
+    assert!(!starts.is_empty() && target.images.len() == 1, "one image and at least one start");
+    let decoder = decoder.into();
+    let (mut all, mut losses) = (Vec::new(), Vec::new());
+    for (k, start) in starts.iter().enumerate() {
+        let before = k as u64 * config.steps;
+        let start = std::slice::from_ref(start);
+        let FitResult { latents, last, .. } =
+            fit_watched(decoder, target, start, config, &mut |step, loss| watch(before + step, loss))?;
+        all.extend(latents);
+        losses.extend(last);
+    }
+    let best = (0..all.len()).min_by(|a, b| losses[*a].total_cmp(&losses[*b])).unwrap_or(0);
+    Ok(Best { latent: all[best].clone(), loss: losses[best], all, losses })
+}

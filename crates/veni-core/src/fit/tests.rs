@@ -1,0 +1,229 @@
+//! Latents that are found again, masks, clipping, exposures, and both ways to run a decoder.
+
+use burn::tensor::Device;
+
+use super::*;
+use crate::data::random::{Purpose, normal, stream};
+use crate::model::{DecoderConfig, Model, ModelConfig, ModelInfo};
+use crate::sphere::Equirect;
+use crate::train::loss::LossConfig;
+use crate::vae::{Decoder, veni::model_of, weights};
+
+fn decoder() -> Decoder {
+    let config = DecoderConfig { hidden: 16, layers: 2, heads: 2, ..DecoderConfig::default() };
+    Decoder::new(&config, 3, &mut stream(1, Purpose::Weights, 0, 0), &Device::flex())
+}
+
+fn latent(seed: u64) -> Latent {
+    let mut rng = stream(seed, Purpose::Fit, 0, 0);
+    Latent::new((0..3).map(|_| [0; 3].map(|_| normal(&mut rng) as f32)).collect())
+}
+
+fn image(decoder: &Decoder, grid: Equirect, seed: u64) -> Vec<f32> {
+    crate::vae::veni::decode(decoder, grid, &[latent(seed).vectors]).remove(0)
+}
+
+#[test]
+fn images_of_the_decoder_itself_are_found_again() {
+    let (decoder, grid) = (decoder(), Equirect::new(16, 8));
+    let images = [1, 2].map(|seed| image(&decoder, grid, seed));
+    let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
+    let target = FitTarget::panoramas(grid, &views);
+    let config = FitConfig { prior: 0.0, ..FitConfig::thorough() };
+    let moved = |seed| Latent::new(latent(seed).vectors.into_iter().map(|v| v.map(|c| c + 0.03)).collect());
+    let start = [1, 2].map(moved);
+    let result = fit(&decoder, &target, &start, &config).unwrap();
+    let (first, last) = (result.losses[0], *result.losses.last().unwrap());
+    assert!(last < 0.02 * first, "{first} to {last}");
+}
+
+#[test]
+fn a_mask_hides_what_it_covers_and_a_free_scale_finds_the_exposure() {
+    let (decoder, grid) = (decoder(), Equirect::new(16, 8));
+    let mut image = image(&decoder, grid, 1);
+    let mut mask = vec![1.0; grid.len()];
+    for p in 0..40 {
+        mask[p] = 0.0;
+        image[3 * p..3 * p + 3].fill(50.0);
+    }
+    let run = |image: &[f32], free_exposure| {
+        let (images, masks) = ([image], [mask.as_slice()]);
+        let target = FitTarget { masks: Some(&masks), ..FitTarget::panoramas(grid, &images) };
+        let config = FitConfig { steps: 60, prior: 0.0, free_exposure, ..FitConfig::thorough() };
+        fit(&decoder, &target, &[latent(1)], &config).unwrap()
+    };
+    let exact = run(&image, false);
+    assert!(exact.losses[0] < 1e-9, "what is masked does not count: {}", exact.losses[0]);
+    let brighter: Vec<f32> = image.iter().map(|v| v + 0.7).collect();
+    let scaled = run(&brighter, true);
+    assert!(scaled.losses[59] < 0.1 * scaled.losses[0]);
+    assert!(scaled.latents[0].log_exposure > 0.2);
+}
+
+#[test]
+fn what_does_not_fit_together_is_refused() {
+    let (decoder, grid) = (decoder(), Equirect::new(4, 2));
+    let image = vec![0.0; 24];
+    let message = |images: &[&[f32]], masks, start: &[Latent]| {
+        let target = FitTarget { masks, ..FitTarget::panoramas(grid, images) };
+        fit(&decoder, &target, start, &FitConfig::thorough()).unwrap_err().to_string()
+    };
+    assert!(message(&[], None, &[]).contains("0 images"));
+    assert!(message(&[&image], None, &[]).contains("0 latents"));
+    assert!(message(&[&image[1..]], None, &[latent(1)]).contains("23 values"));
+    assert!(message(&[&image], None, &[Latent::new(latent(1).vectors[..2].to_vec())]).contains("2 vectors"));
+    let empty = [0.0; 8];
+    assert!(message(&[&image], Some(&[&empty]), &[latent(1)]).contains("mask"));
+}
+
+/// The same decoder as a model, whose folded form takes the fast way.
+fn model(decoder: &Decoder) -> Model {
+    let config = DecoderConfig { hidden: 16, layers: 2, heads: 2, ..DecoderConfig::default() };
+    let config = ModelConfig { decoder: config, ..ModelConfig::decode_only(3) };
+    model_of(weights::read(decoder, "decoder."), &config, ModelInfo::default()).unwrap()
+}
+
+fn objectives() -> [Objective; 6] {
+    [
+        Objective::LogError,
+        Objective::LogAbsolute,
+        Objective::Display { log: 0.01 },
+        Objective::ReferenceLogError,
+        Objective::CosineScaleInvariant,
+        Objective::Terms(LossConfig { mage_scales: 1, ..LossConfig::default() }),
+    ]
+}
+
+#[test]
+fn the_fast_way_and_the_graph_go_the_same_way() {
+    let (decoder, grid) = (decoder(), Equirect::new(16, 8));
+    let folded = model(&decoder).decoder();
+    let images = [1, 2].map(|seed| image(&decoder, grid, seed));
+    let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
+    let target = FitTarget::panoramas(grid, &views);
+    let start = [3, 4].map(latent);
+    for objective in objectives() {
+        let config =
+            FitConfig { steps: 5, objective, free_exposure: true, prior: 0.01, ..FitConfig::thorough() };
+        let fast = fit(&folded, &target, &start, &config).unwrap();
+        let graph = fit(&decoder, &target, &start, &config).unwrap();
+        let close =
+            |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4 * (1.0 + b.abs()));
+        assert!(close(&fast.losses, &graph.losses), "{objective:?}: {:?} {:?}", fast.losses, graph.losses);
+        assert!(close(&fast.last, &graph.last), "{objective:?}: {:?} {:?}", fast.last, graph.last);
+        for (a, b) in fast.latents.iter().zip(&graph.latents) {
+            let pairs = a.vectors.as_flattened().iter().zip(b.vectors.as_flattened());
+            let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(apart < 2e-3, "{objective:?}: {apart}");
+            assert!((a.log_exposure - b.log_exposure).abs() < 2e-3, "{objective:?}");
+        }
+        assert!(fast.losses[4] < fast.losses[0], "{objective:?}");
+    }
+}
+
+#[test]
+fn slopes_are_those_of_the_pixel_losses() {
+    let grid = Equirect::new(4, 2);
+    let image: Vec<f32> = (0..24).map(|k| (k as f32 * 0.7).sin()).collect();
+    let clipped: Vec<bool> = (0..24).map(|k| k % 3 == 0).collect();
+    let (images, clips) = ([image.as_slice()], [clipped.as_slice()]);
+    let target = FitTarget { clipped: Some(&clips), ..FitTarget::panoramas(grid, &images) };
+    for objective in &objectives()[..4] {
+        let loss = PixelLoss::new(*objective, &target, 0, &target.areas()).unwrap();
+        for pixel in 0..8 {
+            let p = [0, 1, 2].map(|c| (1.3 * (3 * pixel + c) as f64).cos());
+            let (_, slopes) = loss.at(pixel, p);
+            for c in 0..3 {
+                let moved = |step: f64| {
+                    let mut q = p;
+                    q[c] += step;
+                    loss.at(pixel, q).0
+                };
+                let expected = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+                assert!((slopes[c] - expected).abs() < 1e-7, "{objective:?}, {pixel}, {c}");
+            }
+        }
+    }
+}
+
+#[test]
+fn clipped_values_ask_only_for_at_least_as_much() {
+    let (decoder, grid) = (decoder(), Equirect::new(16, 8));
+    let truth = image(&decoder, grid, 1);
+    // everything above a level is cut off
+    let level = 0.05;
+    let cut: Vec<f32> = truth.iter().map(|v| v.min(level)).collect();
+    let clipped: Vec<bool> = truth.iter().map(|v| *v >= level).collect();
+    assert!(clipped.iter().filter(|c| **c).count() > 20, "nothing to clip");
+    let loss = |clipped: Option<&[&[bool]]>| {
+        let images = [cut.as_slice()];
+        let target = FitTarget { clipped, ..FitTarget::panoramas(grid, &images) };
+        let config = FitConfig { steps: 1, prior: 0.0, ..FitConfig::thorough() };
+        fit(&decoder, &target, &[latent(1)], &config).unwrap().losses[0]
+    };
+    assert!(loss(Some(&[&clipped])) < 1e-12, "the truth fits an image that is cut off");
+    assert!(loss(None) > 1e-6, "without the flag it does not");
+}
+
+#[test]
+fn a_fit_ends_on_a_plateau_and_says_what_it_reached() {
+    let (decoder, grid) = (decoder(), Equirect::new(16, 8));
+    let folded = model(&decoder).decoder();
+    let image = image(&decoder, grid, 1);
+    let images = [image.as_slice()];
+    let target = FitTarget::panoramas(grid, &images);
+    let plateau = Some(Plateau { patience: 20, improvement: 1e-2 });
+    let config = FitConfig { steps: 5000, plateau, prior: 0.0, ..FitConfig::thorough() };
+    let mut calls = 0;
+    let result = fit_watched(&folded, &target, &[latent(2)], &config, &mut |_, _| calls += 1).unwrap();
+    assert!((21..4000).contains(&result.losses.len()), "{}", result.losses.len());
+    assert_eq!(calls, result.losses.len());
+    let again = FitConfig { steps: 0, ..config };
+    let again = fit(&folded, &target, &result.latents, &again).unwrap();
+    assert_eq!(again.last, result.last);
+    assert_eq!(again.latents, result.latents);
+}
+
+#[test]
+fn of_several_starts_the_best_is_kept_and_the_seed_decides() {
+    let (decoder, grid) = (decoder(), Equirect::new(16, 8));
+    let folded = model(&decoder).decoder();
+    let image = image(&decoder, grid, 1);
+    let images = [image.as_slice()];
+    let target = FitTarget::panoramas(grid, &images);
+    let prior = crate::latent::Prior::standard(3);
+    let starts = random_starts(&prior, 0.5, 3, 7);
+    assert_eq!(starts, random_starts(&prior, 0.5, 3, 7));
+    assert_ne!(starts[0], starts[1]);
+    let config = FitConfig { steps: 30, ..FitConfig::thorough() };
+    let best = best_of(&folded, &target, &starts, &config, &mut |_, _| {}).unwrap();
+    assert_eq!((best.all.len(), best.losses.len()), (3, 3));
+    let least = best.losses.iter().copied().fold(f64::INFINITY, f64::min);
+    assert_eq!(best.loss, least);
+    assert!(best.losses.iter().any(|l| *l > least), "three starts that end alike show nothing");
+}
+
+#[test]
+fn settings_that_make_no_sense_are_refused_by_name() {
+    let (decoder, grid) = (decoder(), Equirect::new(16, 8));
+    let image = image(&decoder, grid, 1);
+    let images = [image.as_slice()];
+    let whole = FitTarget::panoramas(grid, &images);
+    let message = |target: &FitTarget<'_>, config: FitConfig| {
+        fit(&decoder, target, &[latent(1)], &config).unwrap_err().to_string()
+    };
+    let thorough = FitConfig::thorough();
+    assert!(message(&whole, FitConfig { prior: -1.0, ..thorough }).contains("prior = -1"));
+    let mask = vec![1.0; grid.len()];
+    let masked = FitTarget { masks: Some(&[&mask]), ..whole.clone() };
+    for objective in &objectives()[4..] {
+        let message = message(&masked, FitConfig { objective: *objective, ..thorough });
+        assert!(message.contains("takes no masks"), "{message}");
+    }
+    let mut hole = image.clone();
+    hole[7] = f32::NAN;
+    let hole = [hole.as_slice()];
+    assert!(message(&FitTarget::panoramas(grid, &hole), thorough).contains("pixel 2 is NaN"));
+    let areas = vec![0.0; grid.len()];
+    assert!(message(&FitTarget { areas: Some(&areas), ..whole }, thorough).contains("areas"));
+}
