@@ -1,7 +1,7 @@
 //! Baking on every adapter and on the CPU, filler weights: `cargo bench -p veni-gpu --bench bake`.
 //!
-//! Software adapters get the smallest panorama only. `veni-cli bench` prints the same as a table, with each device's own
-//! rate of multiply-adds beside it.
+//! Software adapters get the smallest panorama only, the CPU the two smaller ones. `veni-cli bench` prints all of them as a
+//! table, with each device's own rate of multiply-adds beside it.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;

@@ -19,7 +19,7 @@ struct VeniRequest {
     latent: u32,
     // Added to log radiance
     log_exposure: f32,
-    // Largest radiance that is stored
+    // Largest number that is stored
     largest: f32,
     // 1 to store log radiance
     logarithm: u32,

@@ -4,7 +4,7 @@
 //! [`condition`](decoder::GpuDecoder::condition) folds a latent on the CPU and uploads a few kilobytes;
 //! [`bake`](decoder::GpuDecoder::bake) records a compute pass into the host's command encoder: a panorama, cube
 //! faces, or radiances for a buffer of directions. Nothing here creates an instance, submits, or installs an error
-//! handler, except the conveniences in [`read_back`] and [`adapters`], which say so.
+//! handler, except the conveniences in [`read_back`], [`adapters`] and [`probe`], which say so.
 //!
 //! [`shader`] has no wgpu types: WGSL text, sizes, binding layouts and packed weights for any API, and the function
 //! `veni_radiance` to paste into a path tracer. It is all that is left without the feature `wgpu`.

@@ -58,15 +58,18 @@ pub fn multiply_add_rate(device: &Device, queue: &Queue) -> Result<f64> {
         })
     })?;
     let timed = |count: u32, workgroups: u32| -> Result<Duration> {
-        queue.write_buffer(&rounds, 0, bytemuck::cast_slice(&[count, 0, 0, 0]));
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(&pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(workgroups, 1, 1);
-        drop(pass);
-        let started = Instant::now();
-        queue.submit([encoder.finish()]);
+        let started = guarded(device, "rate probe", || {
+            queue.write_buffer(&rounds, 0, bytemuck::cast_slice(&[count, 0, 0, 0]));
+            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups(workgroups, 1, 1);
+            drop(pass);
+            let started = Instant::now();
+            queue.submit([encoder.finish()]);
+            started
+        })?;
         device.poll(PollType::wait_indefinitely()).map_err(|e| Error::gpu("rate probe", e))?;
         Ok(started.elapsed())
     };
@@ -110,11 +113,13 @@ pub fn largest_error(device: &Device, queue: &Queue) -> Result<f32> {
             mapped_at_creation: false,
         })
     })?;
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut encoder = guarded(device, "probe", || {
+        device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    })?;
     let whole = crate::shader::Grid::Equirect { width: grid.width as u32, height: grid.height as u32 };
     let bake = Bake::rows(&pixels, whole, 0..grid.height as u32).logarithm();
     decoder.bake(&mut encoder, &latents, &bake)?;
-    queue.submit([encoder.finish()]);
+    guarded(device, "probe", || queue.submit([encoder.finish()]))?;
     let found = read_back::buffer(device, queue, &pixels)?;
     let differences = found.as_flattened().iter().zip(expected.as_flattened()).map(|(a, b)| (a - b).abs());
     // a NaN must not pass for a small number: it counts as infinitely wrong

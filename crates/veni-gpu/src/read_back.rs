@@ -9,7 +9,7 @@ use wgpu::{
     TexelCopyBufferLayout, TexelCopyTextureInfo, Texture, TextureAspect, TextureFormat,
 };
 
-use crate::decoder::{Bake, GpuDecoder, GpuLatents};
+use crate::decoder::{Bake, GpuDecoder, GpuLatents, count};
 use crate::error::{Error, Result};
 use crate::scope::guarded;
 use crate::shader::Grid;
@@ -17,7 +17,7 @@ use crate::shader::Grid;
 /// Bytes of a band of rows: small enough for every device's bindings and for memory, large enough to keep it busy.
 const BAND_BYTES: u64 = 32 << 20;
 
-/// What a bake of rows looks like: a panorama or stacked cube faces, and the options of [`Bake`].
+/// What a bake of rows looks like: a panorama or stacked cube faces, in a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Picture {
     /// The whole grid.
@@ -39,12 +39,13 @@ pub fn bake_rows<E: From<Error>>(
     picture: Picture,
     mut each_row: impl FnMut(usize, &[[f32; 3]]) -> Result<(), E>,
 ) -> Result<(), E> {
-    let (width, height) = match picture.grid {
-        Grid::Equirect { width, height } => (width, height),
-        Grid::Cube { size } => (size, 6 * size),
-        Grid::List { .. } => return Err(Error::invalid("a list of directions has no rows").into()),
-    };
-    let row_bytes = 16 * u64::from(width) * u64::from(latents.len());
+    if let Grid::List { .. } = picture.grid {
+        return Err(Error::invalid("a list of directions has no rows").into());
+    }
+    let latents = &latents.first();
+    let width = picture.grid.width();
+    let height = count(picture.grid)? / width;
+    let row_bytes = 16 * u64::from(width);
     let band = (BAND_BYTES / row_bytes).clamp(1, u64::from(height)) as u32;
     let device = decoder.device();
     let size = row_bytes * u64::from(band);
@@ -84,9 +85,13 @@ pub fn bake_rows<E: From<Error>>(
 /// The RGB of every vec4f in a buffer of usage `COPY_SRC`.
 ///
 /// # Errors
-/// [`Error::Gpu`] if it cannot be copied or the device is lost.
+/// [`Error::Invalid`] if its size is not that of one vec4f or more; [`Error::Gpu`] if it cannot be copied or the device
+/// is lost.
 pub fn buffer(device: &Device, queue: &Queue, from: &Buffer) -> Result<Vec<[f32; 3]>> {
     let size = from.size();
+    if size == 0 || !size.is_multiple_of(16) {
+        return Err(Error::invalid(format!("a buffer of {size} bytes does not hold whole vec4f")));
+    }
     let host = host_buffer(device, size)?;
     let mut encoder = encoder(device)?;
     encoder.copy_buffer_to_buffer(from, 0, &host, 0, size);

@@ -13,8 +13,8 @@
 //!   CPU fills in a moment. The skies have no point-like sun, so nothing needs to be clamped against bright dots.
 //! - The latent is turned so that the light comes from where it suits the scene; `--turn DEGREES` turns it otherwise.
 //!
-//! The defaults are for adapters in software, such as Mesa's lavapipe. It compiles the network for half a minute or more
-//! the first time (then Mesa remembers it), and traces some thousand paths per second.
+//! The defaults are for adapters in software, such as Mesa's lavapipe. It compiles the network for some ten seconds the
+//! first time (then Mesa remembers it), and traces some thousand paths per second.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -57,6 +57,13 @@ fn main() -> Result<()> {
         false => pollster::block_on(adapter.open())?,
     };
     eprintln!("{opened}");
+    let [width, height] = options.size.map(u64::from);
+    let most = opened.device.limits().max_storage_buffer_binding_size;
+    if 16 * width * height > most {
+        return Err(
+            format!("{width}x{height}: this device holds pictures of {} pixels at most", most / 16).into()
+        );
+    }
 
     let model = Model::load(&options.model)?;
     let latent = Latent::from_seed(&model.prior(), options.seed);

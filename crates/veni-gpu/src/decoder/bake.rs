@@ -16,10 +16,12 @@ impl GpuDecoder {
     /// does that when it likes.
     ///
     /// Values beyond the range of the target's texels are clamped to it, never infinite: 65504 for `Rgba16Float`.
+    /// Kernels are compiled at the first bake of each kind; see [`GpuDecoder::prepare`].
     ///
     /// # Errors
     /// [`Error::Invalid`] if the target does not fit (format, usage, size, layers) or the latents are another model's;
-    /// [`Error::Gpu`] if the device fails to make a resource. Nothing is recorded then.
+    /// [`Error::Unsupported`] if a buffer is larger than the device binds; [`Error::Gpu`] if the device fails to make a
+    /// resource. Nothing is recorded then.
     pub fn bake(&self, encoder: &mut CommandEncoder, latents: &GpuLatents, bake: &Bake<'_>) -> Result<()> {
         self.check_owner(latents)?;
         let (directions, store, request) = bake.request(latents.count)?;

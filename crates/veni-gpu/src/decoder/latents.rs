@@ -30,6 +30,11 @@ impl GpuLatents {
         self.count == 0
     }
 
+    /// The first of them alone, in the same memory.
+    pub(crate) fn first(&self) -> Self {
+        Self { count: 1, ..self.clone() }
+    }
+
     /// `veni_latents`, for a shader that includes [`field`](crate::shader::field).
     pub fn buffer(&self) -> &Buffer {
         &self.buffer
@@ -83,7 +88,7 @@ impl GpuDecoder {
     ///
     /// # Errors
     /// [`Error::Core`] as for [`GpuDecoder::condition`]; [`Error::Invalid`] if there is no room for them or the batch is
-    /// another model's.
+    /// another model's; [`Error::Gpu`] if the device fails.
     pub fn update(&self, queue: &Queue, into: &GpuLatents, first: u32, latents: &[Latent]) -> Result<()> {
         self.check_owner(into)?;
         let (count, room) = (latents.len(), into.count.saturating_sub(first) as usize);

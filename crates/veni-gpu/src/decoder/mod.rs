@@ -13,6 +13,7 @@ use wgpu::{Buffer, BufferDescriptor, BufferUsages, Device};
 
 pub use latents::GpuLatents;
 pub use target::Bake;
+pub(crate) use target::count;
 
 use crate::error::{Error, Result};
 use crate::scope::guarded;
@@ -130,30 +131,27 @@ impl fmt::Debug for GpuDecoder {
 fn choose(device: &Device, packed: &PackedModel, choice: KernelChoice) -> Result<(Kernel, Option<Vec<u16>>)> {
     let (info, features) = (device.adapter_info(), device.features());
     let groups = packed.sizes.columns() as u32 / 2;
-    let plain = Kernel::Tiled {
-        memory: wgpu::Limits::default().max_compute_workgroup_storage_size,
-        subgroups: false,
-    };
-    let best = Kernel::Tiled {
-        memory: device.limits().max_compute_workgroup_storage_size,
-        subgroups: features.contains(wgpu::Features::SUBGROUP)
-            && groups.is_power_of_two()
-            && info.subgroup_min_size >= groups
-            && plain.threads(packed.sizes).is_some_and(|n| n.is_multiple_of(info.subgroup_max_size)),
-    };
+    let memory = device.limits().max_compute_workgroup_storage_size;
+    // a host may have opened its device with less
+    let least = memory.min(wgpu::Limits::default().max_compute_workgroup_storage_size);
+    let plain = Kernel::Tiled { memory: least, subgroups: false };
+    let threads = Kernel::Tiled { memory, subgroups: false }.threads(packed.sizes);
+    let subgroups = features.contains(wgpu::Features::SUBGROUP)
+        && groups.is_power_of_two()
+        && info.subgroup_min_size >= groups
+        && threads.is_some_and(|n| n.is_multiple_of(info.subgroup_max_size));
     let kernel = match choice {
         KernelChoice::PlainEach => Kernel::Each,
         KernelChoice::PlainTiled if plain.threads(packed.sizes).is_none() => {
             let hidden = packed.sizes.hidden;
             return Err(Error::unsupported(format!(
-                "a hidden size of {hidden} is too wide to be tiled in 16 KiB of workgroup memory; let the kernel be chosen"
+                "a hidden size of {hidden} is too wide to be tiled in {least} bytes of workgroup memory; let the kernel \
+                 be chosen"
             )));
         }
         KernelChoice::PlainTiled => plain,
-        KernelChoice::Auto | KernelChoice::SingleWeights => {
-            let fits = [best, plain].into_iter().find(|kernel| kernel.threads(packed.sizes).is_some());
-            fits.unwrap_or(Kernel::Each)
-        }
+        KernelChoice::Auto | KernelChoice::SingleWeights if threads.is_none() => Kernel::Each,
+        KernelChoice::Auto | KernelChoice::SingleWeights => Kernel::Tiled { memory, subgroups },
     };
     let half = choice == KernelChoice::Auto && features.contains(wgpu::Features::SHADER_F16);
     Ok((kernel, if half { packed.matrices.to_half() } else { None }))

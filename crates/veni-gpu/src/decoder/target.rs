@@ -42,17 +42,13 @@ impl<'a> Bake<'a> {
     /// Rows of a panorama or of stacked cube faces (row `face · size + row`) into a storage buffer: a `vec4f` per pixel,
     /// row-major, latent after latent. Panoramas larger than a texture or a binding may be are baked in bands.
     pub fn rows(buffer: &'a Buffer, grid: Grid, rows: Range<u32>) -> Self {
-        let width = match grid {
-            Grid::Equirect { width, .. } => width,
-            Grid::Cube { size } => size,
-            Grid::List { .. } => 1,
-        };
+        let width = grid.width();
         let (first, count) = (rows.start.saturating_mul(width), rows.len() as u32);
         Self::new(Target::Pixels { buffer, grid, first, count: count.saturating_mul(width) })
     }
 
     /// Radiance for `count` unit directions: a storage buffer of `vec4f` (the fourth component is ignored) to a
-    /// storage buffer of `vec4f` per latent and direction.
+    /// storage buffer of `vec4f` per latent and direction, which must be another one.
     pub fn directions(directions: &'a Buffer, radiance: &'a Buffer, count: u32) -> Self {
         Self::new(Target::List { directions, buffer: radiance, count })
     }
@@ -94,11 +90,11 @@ impl<'a> Bake<'a> {
         let (directions, store, grid, first, count) = match self.target {
             Target::Texture { texture, cube } => {
                 let (grid, format) = texture_grid(texture, cube, latents)?;
-                let count = index(grid.directions())?;
+                let count = count(grid)?;
                 (Directions::Grid, Store::Texture(format), grid, 0, count)
             }
             Target::Pixels { buffer, grid, first, count } => {
-                let whole = index(grid.directions())?;
+                let whole = self::count(grid)?;
                 if first.checked_add(count).is_none_or(|end| end > whole) || matches!(grid, Grid::List { .. })
                 {
                     return Err(Error::invalid(format!("{grid:?} does not have these rows")));
@@ -107,6 +103,10 @@ impl<'a> Bake<'a> {
                 (Directions::Grid, Store::Buffer, grid, first, count)
             }
             Target::List { directions, buffer, count } => {
+                // wgpu would say so only when the host finishes its encoder, which is lost then
+                if directions == buffer {
+                    return Err(Error::invalid("directions and radiance are the same buffer; they need two"));
+                }
                 check_buffer(directions, "direction", 1, count)?;
                 check_buffer(buffer, "radiance", latents, count)?;
                 (Directions::Buffer, Store::Buffer, Grid::List { count }, 0, count)
@@ -183,8 +183,9 @@ fn check_buffer(buffer: &Buffer, what: &str, latents: u32, count: u32) -> Result
     Ok(())
 }
 
-/// Directions are counted in 32 bits.
-fn index(directions: u64) -> Result<u32> {
+/// Directions of a grid, which are counted in 32 bits.
+pub(crate) fn count(grid: Grid) -> Result<u32> {
+    let directions = grid.directions();
     match u32::try_from(directions) {
         Ok(count) if count > 0 => Ok(count),
         _ => Err(Error::invalid(format!(

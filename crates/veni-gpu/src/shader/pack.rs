@@ -66,7 +66,11 @@ pub fn pack_model(model: &Model) -> PackedModel {
     PackedModel { sizes, matrices: MatrixWords(matrices.data), vectors: vectors.data }
 }
 
-/// Appends the block of a conditioned latent to `veni_latents`: [`Sizes::latent_stride`] vec4s.
+/// Appends the block of a conditioned latent to `veni_latents`: [`Sizes::latent_stride`] vec4s. `sizes` are those of the
+/// model that conditioned it.
+///
+/// # Panics
+/// If that model's hidden size is too small for `sizes`.
 pub fn pack_latent(sizes: Sizes, field: &Field, out: &mut Vec<f32>) {
     let folded = field.folded();
     let mut rows = Rows { row: 4 * sizes.columns(), data: std::mem::take(out) };

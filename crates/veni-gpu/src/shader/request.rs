@@ -26,6 +26,15 @@ pub enum Grid {
 }
 
 impl Grid {
+    /// Directions in a row of the grid; those of a list are rows of one.
+    pub fn width(self) -> u32 {
+        match self {
+            Self::Equirect { width, .. } => width,
+            Self::Cube { size } => size,
+            Self::List { .. } => 1,
+        }
+    }
+
     /// Directions of the whole grid for one latent.
     pub fn directions(self) -> u64 {
         match self {
@@ -47,7 +56,7 @@ pub struct Request {
     pub turn: f64,
     /// Added to log radiance.
     pub log_exposure: f32,
-    /// Largest radiance that is stored; larger values are clamped to it.
+    /// Largest number that is stored; values beyond it are clamped to it, of either sign.
     pub largest: f32,
     /// Store log radiance instead of radiance.
     pub logarithm: bool,

@@ -14,7 +14,8 @@ const TILED_THREADS: usize = 128;
 const TILE: usize = 64;
 /// Most matrix rows that pass through workgroup memory at a time.
 const STEP: usize = 32;
-/// Most directions of a dispatch, over all latents: about a second of work for a slow integrated GPU.
+/// Most directions of a dispatch, over all latents: about a second of work for a slow integrated GPU. Batches of more
+/// than 16384 latents take more, a tile each.
 const DISPATCH: u32 = 1 << 20;
 
 /// How the work is spread over invocations.
@@ -299,4 +300,50 @@ fn tiling(sizes: Sizes, memory: u32) -> Option<Tiling> {
     let slab = (rows * per_row).max(groups * tile / 4);
     let fits = slab <= room && groups <= TILED_THREADS && step >= 4;
     fits.then_some(Tiling { groups, tile, rows, step, input_step, slab })
+}
+
+#[cfg(test)]
+mod tests {
+    use veni_core::sphere::Frame;
+
+    use super::*;
+    use crate::shader::Grid;
+
+    #[test]
+    fn dispatches_cover_every_tile_once_within_webgpus_limits() {
+        // tiles of 64, 40 and 8 directions
+        for hidden in [128, 200, 700] {
+            let sizes = Sizes { latents: 9, hidden, layers: 6 };
+            let kernel = Kernel::Tiled { memory: 16_384, subgroups: false };
+            let (weights, directions, store) = (Weights::Single, Directions::Grid, Store::Buffer);
+            let variant = Variant { sizes, kernel, weights, directions, store };
+            let tile = variant.tile();
+            for (width, height, latents) in [(1, 1, 1), (1024, 512, 1), (16_384, 8192, 1), (512, 256, 65_535)]
+            {
+                let request = Request {
+                    grid: Grid::Equirect { width, height },
+                    frame: Frame::default(),
+                    turn: 0.0,
+                    log_exposure: 0.0,
+                    largest: f32::MAX,
+                    logarithm: false,
+                    first: 0,
+                    count: width * height,
+                    latent: 0,
+                    tile: 0,
+                };
+                let all = variant.dispatches(request, latents);
+                let mut next = 0;
+                for (i, (request, [x, y, z])) in all.iter().enumerate() {
+                    assert_eq!((request.tile, *z), (next, latents));
+                    assert!((1..=MAX_GROUPS).contains(x) && (1..=MAX_GROUPS).contains(y), "{x} × {y}");
+                    let first_of_next = all.get(i + 1).map(|(request, _)| request.tile);
+                    next = first_of_next.unwrap_or(request.count.div_ceil(tile));
+                    let tiles = next - request.tile;
+                    assert!((tiles..tiles + y).contains(&(x * y)), "{x} × {y} for {tiles} tiles");
+                    assert!(tiles == 1 || tiles * tile * latents <= DISPATCH, "{tiles} tiles");
+                }
+            }
+        }
+    }
 }

@@ -71,6 +71,11 @@ fn half_texels_are_clamped_never_infinite() {
         }
     }
     assert!(clamped > 20 && kept > 20, "{clamped} clamped, {kept} kept: the case tests nothing");
+    // logarithms too, of either sign
+    for (stops, end) in [(1e6, 65_504.0), (-1e6, -65_504.0)] {
+        gpu.bake(&decoder, &latents, &Bake::equirect(&texture).logarithm().brighten(stops));
+        assert!(gpu.read_texture(&texture).as_flattened().iter().all(|v| *v == end), "{stops} stops");
+    }
     // far beyond the range of f32 as well
     bright.log_exposure = 500.0;
     let latents = decoder.condition(&gpu.opened.queue, &bright).unwrap();
@@ -86,8 +91,8 @@ fn rows_come_in_bands_and_in_order() {
     let decoder = GpuDecoder::new(&gpu.opened.device, &model).unwrap();
     let latent = latent(1, 1);
     let latents = decoder.condition(&gpu.opened.queue, &latent).unwrap();
-    // 4096 × 600 takes two bands of 32 MiB
-    let (width, height) = (4096u32, 600u32);
+    // 8192 × 520 takes three bands of 32 MiB: the buffer of the first is used again for the third
+    let (width, height) = (8192u32, 520u32);
     let picture = Picture { grid: Grid::Equirect { width, height }, frame: Default::default() };
     let field = model.decoder().condition(&latent).unwrap();
     let grid = Equirect::new(width as usize, height as usize);
@@ -95,8 +100,8 @@ fn rows_come_in_bands_and_in_order() {
     bake_rows::<Error>(&decoder, &gpu.opened.queue, &latents, picture, |row, pixels| {
         assert_eq!(row, next);
         next += 1;
-        if row % 100 == 7 || (510..515).contains(&row) {
-            for column in [0, 1777, 4095] {
+        if row % 100 == 7 || (254..258).contains(&row) || row >= 510 {
+            for column in [0, 1777, 8191] {
                 let expected = field.radiance(grid.direction(column, row));
                 let off = difference(&[pixels[column].map(f32::ln)], &[expected.map(f32::ln)]);
                 assert!(agrees(off), "row {row}, column {column}: {off:?}");
@@ -105,7 +110,24 @@ fn rows_come_in_bands_and_in_order() {
         Ok(())
     })
     .unwrap();
-    assert_eq!(next, 600);
+    assert_eq!(next, 520);
+}
+
+#[test]
+fn rows_of_a_batch_are_those_of_its_first_latent() {
+    let Some(gpu) = util::plain() else { return };
+    let model = filler(4, 24, 2);
+    let decoder = GpuDecoder::new(&gpu.opened.device, &model).unwrap();
+    let latents = decoder.condition_batch(&gpu.opened.queue, &[latent(4, 1), latent(4, 2)]).unwrap();
+    let picture = Picture { grid: Grid::Equirect { width: 20, height: 10 }, frame: Default::default() };
+    let mut found = Vec::new();
+    bake_rows::<Error>(&decoder, &gpu.opened.queue, &latents, picture, |_, row| {
+        found.extend(row.iter().map(|rgb| rgb.map(f32::ln)));
+        Ok(())
+    })
+    .unwrap();
+    let off = difference(&found, &cpu(&model, &latent(4, 1), Equirect::new(20, 10)));
+    assert!(agrees(off), "{off:?}");
 }
 
 #[test]

@@ -46,17 +46,23 @@ fn one_sign() {
 #[test]
 fn order_of_stages() {
     let Some(gpu) = plain() else { return };
-    // the second matrix before the first, ReLU after the wrong product, the norm's shift before the norm
-    for (from, to) in [
-        (
-            "multiply(veni_matrix_row(layer, 0u), index, x, &y);",
-            "multiply(veni_matrix_row(layer, 1u), index, x, &y);",
-        ),
-        ("y[3] = max(y[3], vec4f());", "y[3] = min(y[3], vec4f());"),
-        ("let shift = latent + (layer + 1u)", "let shift = latent + layer"),
-    ] {
-        assert!(!passes(&gpu, TILED, from, to), "{from}");
+    // the first norm's shift before the norm, the second norm before the second product, and the second norm's shift
+    // before it
+    let norm1 = "normalise(veni_vector(layer, VENI_FIRST_GAMMA), index, x);";
+    let beta1 = "add_vector(x, veni_vectors[beta1], veni_vectors[beta1 + VENI_GROUPS]);";
+    let product2 = "multiply(veni_matrix_row(layer, 1u), index, &y, x);";
+    let norm2 = "normalise(veni_vector(layer, VENI_SECOND_GAMMA), index, x);";
+    let shift = "add_vector(x, veni_latents[shift], veni_latents[shift + VENI_GROUPS]);";
+    for (first, second) in [(norm1, beta1), (product2, norm2), (norm2, shift)] {
+        let order = |a: &str, b: &str| format!("{a}\n    {b}");
+        assert!(!passes(&gpu, TILED, &order(first, second), &order(second, first)), "{first}");
     }
-    let each = "veni_normalise(layer, VENI_FIRST_GAMMA, columns, &x);";
-    assert!(!passes(&gpu, Kernel::Each, each, ""));
+    // the second matrix in place of the first, a ReLU of the wrong sign, a norm left out
+    for (kernel, from, to) in [
+        (TILED, "veni_matrix_row(layer, 0u), index", "veni_matrix_row(layer, 1u), index"),
+        (TILED, "y[3] = max(y[3], vec4f());", "y[3] = min(y[3], vec4f());"),
+        (Kernel::Each, "veni_normalise(layer, VENI_FIRST_GAMMA, columns, &x);", ""),
+    ] {
+        assert!(!passes(&gpu, kernel, from, to), "{from}");
+    }
 }

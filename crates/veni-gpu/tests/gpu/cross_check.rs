@@ -92,6 +92,16 @@ fn subgroups() {
     for hidden in [16, 64, 128] {
         compare(&filler(4, hidden, 2), 4, &format!("h = {hidden}"), KernelChoice::Auto, &gpu);
     }
+    // h = 64: eight groups, 64 invocations
+    let (device, info) = (&gpu.opened.device, &gpu.opened.info);
+    let summed = device.features().contains(veni_gpu::wgpu::Features::SUBGROUP)
+        && (8..=64).contains(&info.subgroup_min_size)
+        && info.subgroup_max_size <= 64;
+    if !summed {
+        say("no subgroups of 8 to 64 invocations: sums within them not tested");
+    }
+    let kernel = GpuDecoder::new(device, &filler(4, 64, 2)).unwrap().kernel();
+    assert!(!summed || matches!(kernel, Kernel::Tiled { subgroups: true, .. }), "{kernel:?}");
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! What does not fit is refused by name, and the host's device goes on.
 
 use veni_core::latent::Latent;
-use veni_core::sphere::Equirect;
+use veni_core::sphere::{Equirect, Frame};
+use veni_gpu::read_back::{self, Picture, bake_rows};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::{BufferUsages, TextureFormat, TextureUsages};
 use veni_gpu::{Bake, Error, GpuDecoder};
@@ -39,6 +40,7 @@ fn what_does_not_fit_is_named() {
     let unstored = gpu.buffer(1024, BufferUsages::COPY_DST);
     refused(&decoder, &Bake::directions(&unstored, &small, 2), &["direction buffer", "STORAGE"]);
     refused(&decoder, &Bake::rows(&small, grid, 0..1).turn(f64::NAN), &["NaN"]);
+    refused(&decoder, &Bake::directions(&small, &small, 8), &["same buffer"]);
     let other = GpuDecoder::new(device, &filler(4, 16, 1)).unwrap();
     refused(&other, &Bake::rows(&small, grid, 0..1), &["model"]);
 
@@ -53,6 +55,24 @@ fn what_does_not_fit_is_named() {
     assert!(decoder.condition_batch(queue, &[]).unwrap_err().to_string().contains("0 latents"));
     let two = [latent(4, 1), latent(4, 2)];
     assert!(decoder.update(queue, &latents, 0, &two).unwrap_err().to_string().contains("do not fit"));
+
+    for grid in [
+        Grid::Equirect { width: 0, height: 4 },
+        Grid::Equirect { width: 8, height: 0 },
+        Grid::Cube { size: u32::MAX },
+        Grid::List { count: 8 },
+    ] {
+        let picture = Picture { grid, frame: Frame::default() };
+        let refused = bake_rows::<Error>(&decoder, queue, &latents, picture, |_, _| Ok(())).unwrap_err();
+        assert!(matches!(refused, Error::Invalid(_)), "{grid:?}: {refused:?}");
+    }
+    for size in [0, 20] {
+        let odd = gpu.buffer(size, BufferUsages::COPY_SRC);
+        let refused = read_back::buffer(device, queue, &odd).unwrap_err();
+        assert!(refused.to_string().contains(&format!("{size} bytes")), "{refused}");
+    }
+    let unread = gpu.buffer(32, BufferUsages::STORAGE);
+    assert!(matches!(read_back::buffer(device, queue, &unread).unwrap_err(), Error::Gpu { .. }));
 
     // and everything still works
     queue.submit([encoder.finish()]);

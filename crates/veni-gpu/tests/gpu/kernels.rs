@@ -54,6 +54,18 @@ impl Work {
 
     /// Runs `source` with the variant's bindings and dispatches; the target has `room` vec4f.
     pub(crate) fn run(&self, gpu: &Gpu, variant: &Variant, source: &str, room: usize) -> Vec<[f32; 4]> {
+        self.run_by(&variant.dispatches(self.request, 1), gpu, variant, source, room)
+    }
+
+    /// The same with dispatches of one's choice.
+    fn run_by(
+        &self,
+        dispatches: &[(Request, [u32; 3])],
+        gpu: &Gpu,
+        variant: &Variant,
+        source: &str,
+        room: usize,
+    ) -> Vec<[f32; 4]> {
         let device = &gpu.opened.device;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: None,
@@ -89,13 +101,13 @@ impl Work {
             layout: &pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
-        for (request, [x, y, z]) in variant.dispatches(self.request, 1) {
+        for (request, [x, y, z]) in dispatches {
             gpu.opened.queue.write_buffer(&uniform, 0, &request.to_bytes());
             let mut encoder = device.create_command_encoder(&Default::default());
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(&pipeline);
             pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(x, y, z);
+            pass.dispatch_workgroups(*x, *y, *z);
             drop(pass);
             gpu.opened.queue.submit([encoder.finish()]);
         }
@@ -125,6 +137,25 @@ fn a_host_without_our_host_side_gets_the_same_numbers() {
         let variant = list_variant(work.twin.sizes, kernel);
         let off = difference(&work.log_radiance(&gpu, &variant, &variant.source()), &work.expected());
         assert!(agrees(off), "{kernel:?}: {off:?}");
+    }
+}
+
+/// Narrow tiles of wide decoders need more workgroups than one dimension has. Here three tiles, and one too many.
+#[test]
+fn tiles_in_two_dimensions_and_in_several_dispatches() {
+    let Some(gpu) = plain() else { return };
+    let work = Work::new(&filler(3, 20, 2), &[latent(3, 3)], directions(150));
+    for kernel in [TILED, Kernel::Each] {
+        let variant = list_variant(work.twin.sizes, kernel);
+        assert_eq!(variant.tile(), 64);
+        let square = [(work.request, [2, 2, 1])];
+        let parts = [(work.request, [1, 1, 1]), (Request { tile: 1, ..work.request }, [1, 3, 1])];
+        for dispatches in [&square[..], &parts[..]] {
+            let found = work.run_by(dispatches, &gpu, &variant, &variant.source(), 150);
+            let found: Vec<_> = found.into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
+            let off = difference(&found, &work.expected());
+            assert!(agrees(off), "{kernel:?}, {dispatches:?}: {off:?}");
+        }
     }
 }
 

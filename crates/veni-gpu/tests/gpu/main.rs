@@ -8,6 +8,7 @@ mod breaks;
 mod cross_check;
 mod errors;
 mod kernels;
+#[cfg(unix)]
 mod memory;
 mod naga;
 mod repetition;

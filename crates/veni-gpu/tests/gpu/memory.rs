@@ -16,7 +16,6 @@ const ADDRESS_SPACE: u64 = 6 << 20;
 const BLOCK: u64 = 64 << 20;
 
 #[test]
-#[cfg(unix)]
 fn out_of_memory_is_an_error_and_the_device_goes_on() {
     if std::env::var_os(INSIDE).is_some() {
         return fill_up();

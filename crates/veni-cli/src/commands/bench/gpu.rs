@@ -78,11 +78,12 @@ impl Bakes for Loaded {
             // the old one is gone by now: two large ones may not fit
             _ => Target::new(device, self.room, grid)?,
         };
-        let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
+        let mut encoder =
+            checked(device, || device.create_command_encoder(&CommandEncoderDescriptor::default()))?;
         for bake in target.bakes(grid) {
             self.decoder.bake(&mut encoder, &self.latents, &bake)?;
         }
-        let commands = encoder.finish();
+        let commands = checked(device, || encoder.finish())?;
         let time = checked(device, || {
             let started = Instant::now();
             queue.submit([commands]);
