@@ -11,7 +11,8 @@ command -v cc >/dev/null || need+=(gcc libc6-dev)
 if [[ $(uname -s) == Linux && ${VENI_SKIP_GPU:-0} != 1 ]]; then
     shopt -s nullglob
     drivers=(/usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json)
-    loader=$(ldconfig -p 2>/dev/null | grep -c 'libvulkan\.so\.1' || true)
+    # sbin is not in everybody's PATH
+    loader=$(PATH=$PATH:/sbin:/usr/sbin ldconfig -p 2>/dev/null | grep -c 'libvulkan\.so\.1' || true)
     ((${#drivers[@]} && loader)) || need+=(mesa-vulkan-drivers libvulkan1 vulkan-validationlayers)
 fi
 

@@ -18,7 +18,8 @@ pub struct FitConfig {
     pub epsilon: f64,
     /// What is compared.
     pub objective: Objective,
-    /// Weight of ½ mean |z|² over the latent vectors, which pulls towards the standard normal prior; 0: off.
+    /// Weight of −ln p of the latent, divided by N, p being [`FitTarget::prior`](super::FitTarget::prior) (½ mean
+    /// |z|² where none is given); 0: off.
     pub prior: f64,
     /// Whether each latent's log exposure is optimised too.
     pub free_exposure: bool,

@@ -7,6 +7,7 @@
 mod adam;
 mod config;
 mod network;
+mod observation;
 mod pixel;
 mod starts;
 mod target;
@@ -16,10 +17,11 @@ mod whole;
 
 pub use config::{FitConfig, Objective, Plateau};
 pub use network::FitDecoder;
+pub use observation::{Observation, Picture};
 pub use starts::{Best, best_of, random_starts};
 pub use target::FitTarget;
 
-use crate::latent::Latent;
+use crate::latent::{Latent, Prior};
 use crate::{Error, Result};
 use adam::Variable;
 use network::{ImageLoss, Network};
@@ -67,6 +69,12 @@ pub fn fit_watched<'a>(
     target.check()?;
     let n = decoder.latent_vectors();
     check_starts(start, target.images.len(), n)?;
+    if let Some(prior) = target.prior.filter(|p| p.latent_vectors() != n) {
+        return Err(Error::invalid(format!(
+            "a prior of {} vectors, the decoder takes {n}",
+            prior.latent_vectors()
+        )));
+    }
     let loss = image_loss(decoder, target, config)?;
     let network = Network::new(decoder, target.directions());
     let flat = start.iter().flat_map(|z| z.vectors.as_flattened()).copied();
@@ -76,7 +84,7 @@ pub fn fit_watched<'a>(
     let mut stall = Stall::new(config.plateau, start.len());
     for step in 0..config.steps {
         let mut found = network.evaluate(&latents(&vectors, &exposures, n), &loss)?;
-        add_prior(config.prior, &vectors.values, n, &mut found);
+        add_prior(config.prior, target.prior, &vectors.values, n, &mut found);
         let value = found.losses.iter().sum::<f64>() / found.losses.len() as f64;
         if !value.is_finite() {
             return Err(Error::invalid(format!(
@@ -131,17 +139,20 @@ fn latents(vectors: &Variable, exposures: &Variable, n: usize) -> Vec<Latent> {
     both.map(|(v, log_exposure)| Latent { log_exposure: *log_exposure, ..Latent::new(v) }).collect()
 }
 
-/// ½ weight · mean |z|² of every latent, and its slope.
-fn add_prior(weight: f64, vectors: &[f32], n: usize, found: &mut network::Evaluation) {
+/// weight/N · (−ln p) of every latent, and its slope.
+fn add_prior(weight: f64, prior: Option<&Prior>, vectors: &[f32], n: usize, found: &mut network::Evaluation) {
     if weight == 0.0 {
         return;
     }
-    let scale = weight / n as f64;
-    for (loss, z) in found.losses.iter_mut().zip(vectors.chunks_exact(3 * n)) {
-        *loss += 0.5 * scale * z.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
-    }
-    for (slope, z) in found.vectors.iter_mut().zip(vectors) {
-        *slope += scale * f64::from(*z);
+    let standard = Prior::standard(n);
+    let (prior, scale) = (prior.unwrap_or(&standard), weight / n as f64);
+    let each = vectors.as_chunks::<3>().0.chunks_exact(n).zip(&mut found.losses);
+    for ((z, loss), slopes) in each.zip(found.vectors.chunks_exact_mut(3 * n)) {
+        let (energy, by) = prior.energy(z);
+        *loss += scale * energy;
+        for (slope, by) in slopes.iter_mut().zip(by.as_flattened()) {
+            *slope += scale * by;
+        }
     }
 }
 

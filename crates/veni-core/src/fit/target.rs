@@ -1,5 +1,6 @@
 //! What is fitted: pixels whose direction and log radiance are known.
 
+use crate::latent::Prior;
 use crate::sphere::Equirect;
 use crate::{Error, Result};
 
@@ -20,12 +21,14 @@ pub struct FitTarget<'a> {
     /// Which values are clipped, 3·W·H per image: the truth is at least the image's value, and only a
     /// prediction below it counts. Absent: none.
     pub clipped: Option<&'a [&'a [bool]]>,
+    /// Which latents are likely, for [`FitConfig::prior`](super::FitConfig::prior); absent: standard normal.
+    pub prior: Option<&'a Prior>,
 }
 
 impl<'a> FitTarget<'a> {
     /// Whole panoramas.
     pub fn panoramas(grid: Equirect, images: &'a [&'a [f32]]) -> Self {
-        Self { grid, directions: None, areas: None, images, masks: None, clipped: None }
+        Self { grid, directions: None, areas: None, images, masks: None, clipped: None, prior: None }
     }
 
     /// The direction of every pixel.

@@ -3,6 +3,7 @@
 //! Turning a panorama by α about z turns every vector by α about z; the x and y of a vector form its
 //! equivariant part, z its invariant part. The paper's dimension is D = 3N.
 
+mod density;
 mod file;
 mod normal;
 mod prior;

@@ -22,9 +22,11 @@ mod frame;
 mod gather;
 pub mod reference;
 mod stripes;
+mod view;
 
 pub use cube::CubeFace;
 pub use equirect::Equirect;
 pub use frame::Frame;
 pub use gather::Gather;
 pub use stripes::Stripes;
+pub use view::View;

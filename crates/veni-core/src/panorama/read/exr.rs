@@ -58,6 +58,26 @@ pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -
     })
 }
 
+/// The alpha channel that belongs to the colours that [`read`] takes; 0 where no data is stored.
+pub(super) fn read_alpha(
+    file: impl Read + Seek,
+    path: &Path,
+    options: &ReadOptions,
+) -> Result<Option<Vec<f32>>> {
+    guarded(|| {
+        let reader = exr::block::read(file, false).map_err(|e| wrap(e, path))?;
+        judge_parts(reader.headers(), options)?;
+        let choice = choose(reader.headers(), options)?;
+        let Some(alpha) = choice.alpha else { return Ok(None) };
+        let header = reader.headers()[choice.part].clone();
+        let grid = judge(&header, options)?;
+        let mut panorama = Panorama::new(grid, vec![[0.0; 3]; grid.len()]);
+        let choice = Choice { channels: [alpha; 3], coloured: false, ..choice };
+        blocks(reader, path, &choice, &header, &mut panorama)?;
+        Ok(Some(panorama.pixels.iter().map(|pixel| pixel[0]).collect()))
+    })
+}
+
 pub(super) fn attributes(file: impl Read + Seek, path: &Path) -> Result<BTreeMap<String, String>> {
     guarded(|| {
         let reader = exr::block::read(file, false).map_err(|e| wrap(e, path))?;
@@ -106,6 +126,8 @@ fn judge(header: &Header, options: &ReadOptions) -> Result<crate::sphere::Equire
 struct Choice {
     part: usize,
     channels: [usize; 3],
+    /// Of the same layer, where it has one.
+    alpha: Option<usize>,
     coloured: bool,
 }
 
@@ -150,7 +172,7 @@ fn choose(headers: &[Header], options: &ReadOptions) -> Result<Choice> {
             if sampled || header.channels.list.iter().any(|c| c.sampling != Vec2(1, 1)) {
                 return Err(Error::unsupported("EXR images with subsampled channels are not read"));
             }
-            found.push((name, Choice { part, channels, coloured }, prefix.is_empty()));
+            found.push((name, Choice { part, channels, alpha: get("A"), coloured }, prefix.is_empty()));
         }
     }
     let names = found.iter().map(|(name, ..)| format!("{name:?}")).collect::<Vec<_>>().join(", ");

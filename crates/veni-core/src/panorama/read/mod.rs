@@ -91,6 +91,23 @@ impl Panorama {
         };
         read().map_err(|e| e.in_file(path))
     }
+
+    /// The alpha channel of the pixels that [`Panorama::read_with`] gives, row-major, 0 where an EXR file's data
+    /// window leaves the panorama uncovered; nothing for files without one, Radiance files among them.
+    ///
+    /// # Errors
+    /// As [`Panorama::read_with`].
+    pub fn read_alpha(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Option<Vec<f32>>> {
+        let path = path.as_ref();
+        let read = || {
+            let mut file = open(path)?;
+            match kind(&mut file, path)? {
+                Kind::Exr => exr::read_alpha(file, path, options),
+                Kind::Hdr { .. } => Ok(None),
+            }
+        };
+        read().map_err(|e| e.in_file(path))
+    }
 }
 
 /// The text attributes of an EXR file, from its header alone (no pixel is read); those of the first part where
