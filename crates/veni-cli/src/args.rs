@@ -15,7 +15,7 @@ use crate::commands;
     long_about = "Natural light for renderers, from a learned prior of outdoor skies.\n\n\
         VENI turns an HDR environment map into a few vectors (a latent) that rotate with it, and a latent \
         back into radiance for any direction. This tool bakes skies to image files, on the graphics card if there \
-        is one, encodes panoramas, trains models, shows what is inside files and measures how fast this machine is.",
+        is one, encodes panoramas, fits latents to panoramas, parts of them and photographs, trains models, shows what is inside files and measures how fast this machine is.",
     after_help = "Results are printed on stdout, everything else on stderr.\n\
         Exit codes: 0 fine; 1 ran, but stopped early or the answer is no; 2 error.\n\n\
         Examples:\n  \
@@ -46,6 +46,8 @@ pub(crate) enum Command {
     Sample(commands::sample::Sample),
     #[cfg(feature = "learn")]
     Encode(commands::encode::Encode),
+    #[cfg(feature = "learn")]
+    Fit(commands::fit::Fit),
     Inspect(commands::inspect::Inspect),
     Bench(commands::bench::Bench),
     #[cfg(feature = "learn")]

@@ -37,6 +37,44 @@ pub(crate) fn check(paths: &[PathBuf], extensions: &[&str], overwrite: Overwrite
     Ok(())
 }
 
+/// Where the results for `inputs` go, checked before any work: to the single `output`, or into `folder` under the
+/// inputs' names with another extension; nowhere (stdout) if neither is given.
+#[cfg(feature = "learn")]
+pub(crate) fn one_per_input(
+    inputs: &[PathBuf],
+    output: Option<&PathBuf>,
+    folder: Option<&PathBuf>,
+    extension: &str,
+    overwrite: Overwrite,
+) -> Result<Vec<PathBuf>> {
+    let outputs = match (output, folder) {
+        (Some(_), _) if inputs.len() > 1 => {
+            bail!("-o names one file for {} inputs: name a folder with --out-dir DIR", inputs.len())
+        }
+        (Some(output), _) => vec![output.clone()],
+        (None, None) => return Ok(Vec::new()),
+        (None, Some(folder)) => {
+            let file = |input: &PathBuf| {
+                let Some(stem) = input.file_stem() else { bail!("{}: is no file name", input.display()) };
+                let mut name = stem.to_owned();
+                name.push(".");
+                name.push(extension);
+                Ok(folder.join(name))
+            };
+            let files = inputs.iter().map(file).collect::<Result<Vec<_>>>()?;
+            if !folder.exists() {
+                // nothing to overwrite: only names can clash
+                check_distinct(&files)?;
+                std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+            }
+            files.iter().try_for_each(|f| refuse_existing(f, overwrite))?;
+            files
+        }
+    };
+    check(&outputs, &[extension], overwrite)?;
+    Ok(outputs)
+}
+
 /// The folder that holds `path`.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {

@@ -13,6 +13,7 @@ const BACKGROUND: [u8; 3] = [24; 3];
 
 /// A grid of cells, sRGB, row-major.
 pub(crate) struct Sheet {
+    gap: usize,
     cell: [usize; 2],
     width: usize,
     height: usize,
@@ -25,13 +26,20 @@ impl Sheet {
         let side = |cells: usize, size: usize| cells * (size + GAP) + GAP;
         let cell = [width, height];
         let (width, height) = (side(columns, width), side(rows, height));
-        Self { cell, width, height, pixels: vec![BACKGROUND; width * height] }
+        Self { gap: GAP, cell, width, height, pixels: vec![BACKGROUND; width * height] }
+    }
+
+    /// A single cell without a border.
+    #[cfg(feature = "learn")]
+    pub(crate) fn plain(width: usize, height: usize) -> Self {
+        Self { gap: 0, cell: [width, height], width, height, pixels: vec![BACKGROUND; width * height] }
     }
 
     /// Fills the cell in `column` of `row` with its pixels, row-major.
     pub(crate) fn place(&mut self, column: usize, row: usize, pixels: impl IntoIterator<Item = [u8; 3]>) {
         let [width, height] = self.cell;
-        let (left, top) = (column * (width + GAP) + GAP, row * (height + GAP) + GAP);
+        let gap = self.gap;
+        let (left, top) = (column * (width + gap) + gap, row * (height + gap) + gap);
         for (at, pixel) in pixels.into_iter().take(width * height).enumerate() {
             self.pixels[(top + at / width) * self.width + left + at % width] = pixel;
         }

@@ -25,6 +25,13 @@ fn field(c: &mut Criterion) {
             let name = format!("bake {width}x{height}");
             group.bench_function(name, |b| b.iter_with_large_drop(|| black_box(&field).bake(grid)));
         }
+        // what a step of a fit costs; to be compared with twice the bake
+        let directions = Equirect::new(128, 64).directions();
+        group.throughput(Throughput::Elements(directions.len() as u64));
+        let square = |_, p: [f32; 3]| (0.0, p);
+        group.bench_function("gradient 128x64", |b| {
+            b.iter(|| black_box(&field).gradient(&directions, square))
+        });
         group.finish();
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
 use veni_core::data::Item;
@@ -15,7 +15,6 @@ use veni_core::panorama::tonemap::Tonemap;
 use veni_core::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
 use veni_core::vae::Veni;
-use veni_core::{Error, output::refuse_existing};
 
 use crate::args::{Force, ModelArgs};
 use crate::output::{self, with_remedy};
@@ -171,34 +170,7 @@ impl Encode {
         if let Some(preview) = &self.preview {
             output::check(std::slice::from_ref(preview), &["png"], overwrite)?;
         }
-        let outputs = match (&self.output, &self.out_dir) {
-            (Some(_), _) if self.panoramas.len() > 1 => {
-                bail!(
-                    "-o names one file for {} panoramas: name a folder with --out-dir DIR",
-                    self.panoramas.len()
-                )
-            }
-            (Some(output), _) => vec![output.clone()],
-            (None, None) => return Ok(Vec::new()),
-            (None, Some(folder)) => {
-                let file = |p: &PathBuf| {
-                    let stem = p.file_stem().ok_or_else(|| anyhow!("{}: is no file name", p.display()))?;
-                    let mut name = stem.to_owned();
-                    name.push(".json");
-                    Ok(folder.join(name))
-                };
-                let files = self.panoramas.iter().map(file).collect::<Result<Vec<_>>>()?;
-                if !folder.exists() {
-                    // nothing to overwrite: only names can clash
-                    output::check_distinct(&files)?;
-                    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-                }
-                files.iter().try_for_each(|f| refuse_existing(f, overwrite))?;
-                files
-            }
-        };
-        output::check(&outputs, &["json"], overwrite)?;
-        Ok(outputs)
+        output::one_per_input(&self.panoramas, self.output.as_ref(), self.out_dir.as_ref(), "json", overwrite)
     }
 }
 

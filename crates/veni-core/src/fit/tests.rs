@@ -97,7 +97,7 @@ fn objectives() -> [Objective; 6] {
 #[test]
 fn the_fast_way_and_the_graph_go_the_same_way() {
     let (decoder, grid) = (decoder(), Equirect::new(16, 8));
-    let folded = model(&decoder).decoder();
+    let folded = model(&decoder).decoder().unwrap();
     let images = [1, 2].map(|seed| image(&decoder, grid, seed));
     let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
     let target = FitTarget::panoramas(grid, &views);
@@ -168,7 +168,7 @@ fn clipped_values_ask_only_for_at_least_as_much() {
 #[test]
 fn a_fit_ends_on_a_plateau_and_says_what_it_reached() {
     let (decoder, grid) = (decoder(), Equirect::new(16, 8));
-    let folded = model(&decoder).decoder();
+    let folded = model(&decoder).decoder().unwrap();
     let image = image(&decoder, grid, 1);
     let images = [image.as_slice()];
     let target = FitTarget::panoramas(grid, &images);
@@ -187,7 +187,7 @@ fn a_fit_ends_on_a_plateau_and_says_what_it_reached() {
 #[test]
 fn of_several_starts_the_best_is_kept_and_the_seed_decides() {
     let (decoder, grid) = (decoder(), Equirect::new(16, 8));
-    let folded = model(&decoder).decoder();
+    let folded = model(&decoder).decoder().unwrap();
     let image = image(&decoder, grid, 1);
     let images = [image.as_slice()];
     let target = FitTarget::panoramas(grid, &images);

@@ -49,6 +49,23 @@ impl View {
         [forward, turned(right, up, -sr), turned(up, right, sr)]
     }
 
+    /// The pixel of a `width` × `height` image that a unit direction falls on, row-major; nothing if it is not
+    /// seen.
+    pub fn pixel_of(&self, direction: [f32; 3], width: usize, height: usize) -> Option<usize> {
+        let half = (0.5 * self.fov).tan();
+        let pixel = 2.0 * half / width as f64;
+        let axes = self.axes();
+        let [forward, right, up] =
+            axes.map(|axis| (0..3).map(|k| axis[k] * f64::from(direction[k])).sum::<f64>());
+        if forward <= 0.0 {
+            return None;
+        }
+        let column = (right / forward + half) / pixel;
+        let row = 0.5 * height as f64 - up / forward / pixel;
+        let inside = (0.0..width as f64).contains(&column) && (0.0..height as f64).contains(&row);
+        inside.then(|| row as usize * width + column as usize)
+    }
+
     /// Whether the field of view can be one.
     pub fn is_valid(&self) -> bool {
         self.fov > 0.0
@@ -82,6 +99,16 @@ mod tests {
         // the camera turned clockwise: its right now points down
         let rolled = View { roll: PI / 2.0, ..view };
         assert!(near(rolled.pixels(3, 3).0[5], [1.0 / s, 0.0, -2.0 / 3.0 / s]));
+    }
+
+    #[test]
+    fn a_pixels_direction_falls_on_that_pixel_and_nothing_behind_does() {
+        let view = View { fov: 1.4, azimuth: -2.0, elevation: 0.5, roll: 0.3 };
+        for (p, d) in view.pixels(13, 8).0.into_iter().enumerate() {
+            assert_eq!(view.pixel_of(d, 13, 8), Some(p));
+            assert_eq!(view.pixel_of(d.map(|c| -c), 13, 8), None);
+        }
+        assert_eq!(view.pixel_of([0.0, 0.0, -1.0], 13, 8), None);
     }
 
     #[test]

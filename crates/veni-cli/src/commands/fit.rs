@@ -1,0 +1,307 @@
+//! `veni-cli fit`: pictures to latents, by optimisation.
+
+mod completed;
+mod input;
+mod settings;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use serde_json::json;
+use veni_core::eval::metrics::{Alignment, Scores, scores};
+use veni_core::field;
+use veni_core::fit::{Best, FitConfig, Observation, best_of, random_starts};
+use veni_core::latent::{Latent, Prior};
+use veni_core::output::Overwrite;
+use veni_core::sphere::Equirect;
+use veni_core::train::config::DeviceKind;
+use veni_core::vae::Veni;
+
+use crate::args::{Force, ModelArgs};
+use crate::output::{self, with_remedy};
+use crate::progress::Progress;
+use crate::report::{self, Outcome, Report, to_stdout};
+use crate::size::Size;
+use crate::source::{self, Loaded};
+
+pub(crate) use input::Input;
+use settings::{Settings, Start};
+
+/// Find the latent of a panorama, of a part of one, or of a photograph
+#[derive(Args, Debug)]
+#[command(
+    long_about = "Find the latent of a panorama, of a part of one, or of a photograph, by optimisation.\n\n\
+        A panorama is OpenEXR, Radiance, PNG or JPEG, twice as wide as high, z up. Pixels that are not a number, \
+        transparent, or black in --mask are unknown, and the latent completes them. With --fov the picture is a \
+        photograph taken in the direction of --look. Values that a PNG or JPEG has clipped count as \"at least this \
+        bright\". When part of the sphere is unknown, several starts are tried, the best is kept, and where they \
+        disagree the completion is uncertain.",
+    after_help = "Without -o and --out-dir the latent itself goes to stdout, one line of JSON per picture.\n\n\
+        Examples:\n  \
+        veni-cli fit sky.exr -o sky.json\n  \
+        veni-cli fit half.exr --mask known.png -o sky.json --completed whole.exr --uncertainty doubt.png\n  \
+        veni-cli fit photo.jpg --fov 65 --look 90,10 -o sky.json --completed whole.exr\n  \
+        veni-cli fit sky.exr --preset display -o sky.json && veni-cli bake sky.json -o again.exr"
+)]
+pub(crate) struct Fit {
+    #[command(flatten)]
+    input: Input,
+
+    /// Latent file to write, for a single picture
+    #[arg(long, short, value_name = "OUT.json", conflicts_with = "out_dir")]
+    output: Option<PathBuf>,
+
+    /// Folder for the latents, created if missing; each is named after its picture
+    #[arg(long, value_name = "DIR")]
+    out_dir: Option<PathBuf>,
+
+    /// Also write the whole panorama: what is known as it is, the rest from the latent (.exr, .hdr, .png; one
+    /// picture)
+    #[arg(long, value_name = "OUT")]
+    completed: Option<PathBuf>,
+
+    /// Also write how much the starts disagree: standard deviation of log radiance (.exr, or .png as a heat map
+    /// up to one stop)
+    #[arg(long, value_name = "OUT")]
+    uncertainty: Option<PathBuf>,
+
+    /// Size of the images of --completed and --uncertainty [default: that of a panorama, 1024x512 for a photograph]
+    #[arg(long, value_name = "W|WxH")]
+    size: Option<Size>,
+
+    #[command(flatten)]
+    settings: Settings,
+
+    #[command(flatten)]
+    model: ModelArgs,
+
+    #[command(flatten)]
+    force: Force,
+}
+
+/// What the fits share.
+struct Fitting<'a> {
+    loaded: &'a Loaded,
+    decoder: field::Decoder,
+    prior: Prior,
+    /// Loaded when a start asks for it.
+    encoder: Option<Veni>,
+}
+
+/// One picture's fit.
+pub(crate) struct Fitted {
+    observation: Observation,
+    best: Best,
+    /// Only of whole panoramas.
+    scores: Option<Scores>,
+    seconds: f64,
+}
+
+impl Fit {
+    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        let overwrite = Overwrite::from(self.force);
+        let pictures = &self.input.pictures;
+        self.check_images(overwrite)?;
+        let outputs =
+            output::one_per_input(pictures, self.output.as_ref(), self.out_dir.as_ref(), "json", overwrite)?;
+        self.settings.grid(false)?;
+        let config = self.settings.config()?;
+        let loaded = source::model(&self.model)?;
+        let decoder = loaded.model.decoder().map_err(|e| e.in_file(&loaded.name))?;
+        let mut fitting = Fitting { loaded: &loaded, decoder, prior: loaded.model.prior(), encoder: None };
+        let mut failed = Vec::new();
+        for (at, path) in pictures.iter().enumerate() {
+            match self.one(path, outputs.get(at), &mut fitting, &config, report) {
+                Ok(()) => {}
+                Err(error) if report::is_closed_pipe(&error) => return Err(error),
+                Err(error) => failed.push(error),
+            }
+        }
+        report::last_of(failed)
+    }
+
+    /// Refuses what could not be written after the fits.
+    fn check_images(&self, overwrite: Overwrite) -> Result<()> {
+        let images = [(&self.completed, "--completed"), (&self.uncertainty, "--uncertainty")];
+        for (path, option) in images {
+            if path.is_some() && self.input.pictures.len() > 1 {
+                bail!(
+                    "{option} names one file for {} pictures: fit them one by one",
+                    self.input.pictures.len()
+                );
+            }
+        }
+        let named = |path: &Option<PathBuf>, extensions: &[&str]| {
+            path.iter().try_for_each(|p| output::check(std::slice::from_ref(p), extensions, overwrite))
+        };
+        named(&self.completed, &["exr", "hdr", "png"])?;
+        named(&self.uncertainty, &["exr", "png"])?;
+        output::check_distinct(
+            &[&self.completed, &self.uncertainty].into_iter().flatten().cloned().collect::<Vec<_>>(),
+        )
+    }
+
+    fn one(
+        &self,
+        path: &Path,
+        output: Option<&PathBuf>,
+        fitting: &mut Fitting<'_>,
+        config: &FitConfig,
+        report: Report,
+    ) -> Result<()> {
+        let overwrite = Overwrite::from(self.force);
+        let picture = self.input.read(path, report)?;
+        let grid = self.settings.grid(picture.is_partial())?;
+        let observation = self.input.observe(&picture, grid).map_err(|e| e.in_file(path))?;
+        let mut fitted = self.fit(path, observation, fitting, config, report)?;
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
+        fitted.best.latent.source = Some(name.unwrap_or_else(|| path.display().to_string()));
+        fitted.best.latent.model = Some(fitting.loaded.model.hash());
+        if let Some(output) = output {
+            fitted.best.latent.save(output, overwrite).map_err(with_remedy)?;
+        }
+        let images = completed::Images {
+            decoder: &fitting.decoder,
+            picture: &picture,
+            view: self.input.view(),
+            size: self.size,
+            overwrite,
+        };
+        if let Some(path) = &self.completed {
+            images.completed(path, &fitted.best.latent)?;
+        }
+        if let Some(path) = &self.uncertainty {
+            images.uncertainty(path, &fitted.best)?;
+        }
+        self.print(path, output, &fitted, report)
+    }
+
+    fn fit(
+        &self,
+        path: &Path,
+        observation: Observation,
+        fitting: &mut Fitting<'_>,
+        config: &FitConfig,
+        report: Report,
+    ) -> Result<Fitted> {
+        let started = Instant::now();
+        let partial = observation.is_partial();
+        let starts = self.starts(path, &observation, fitting)?;
+        if let Some(uncertainty) = self.uncertainty.as_ref().filter(|_| starts.len() < 2) {
+            bail!(
+                "{}: one start says nothing about uncertainty: give --starts 4 or more",
+                uncertainty.display()
+            );
+        }
+        let config = self.settings.adapted(*config, partial);
+        let total = config.steps * starts.len() as u64;
+        let mut progress = Progress::start(report, "step", 0, total);
+        let best = observation.with_target(|target| {
+            let target = veni_core::fit::FitTarget { prior: Some(&fitting.prior), ..target.clone() };
+            best_of(&fitting.decoder, &target, &starts, &config, &mut |step, loss| {
+                progress.set(step, || format!("loss {loss:.4}"));
+            })
+        });
+        progress.finish();
+        let mut best = best.map_err(|e| e.in_file(path))?;
+        let scores = match (partial, observation.clipped.is_some()) {
+            (false, false) => Some(score(&fitting.decoder, &best.latent, &observation)?),
+            _ => None,
+        };
+        // from the image's exposure 0 to its own
+        for latent in best.all.iter_mut().chain([&mut best.latent]) {
+            latent.log_exposure += observation.log_exposure;
+        }
+        Ok(Fitted { observation, best, scores, seconds: started.elapsed().as_secs_f64() })
+    }
+
+    /// The latents to start from, at the exposure that the observation was brought to.
+    fn starts(
+        &self,
+        path: &Path,
+        observation: &Observation,
+        fitting: &mut Fitting<'_>,
+    ) -> Result<Vec<Latent>> {
+        let whole = !observation.is_partial();
+        let has_encoder = fitting.loaded.model.has_encoder();
+        let (start, count) = self.settings.start(whole, has_encoder);
+        let n = fitting.decoder.latent_vectors();
+        let first = match start {
+            Start::Noise => None,
+            Start::Zero => Some(Latent::new(vec![[0.0; 3]; n])),
+            Start::Encoder if !whole => bail!(
+                "{}: the encoder needs a whole panorama, and part of this one is unknown: use --start zero or noise",
+                path.display()
+            ),
+            Start::Encoder if !has_encoder => {
+                bail!("{}: this model has no encoder: use --start zero or noise", fitting.loaded.name)
+            }
+            Start::Encoder => Some(fitting.encoded(observation)?),
+        };
+        let rest = count - usize::from(first.is_some());
+        let random = random_starts(&fitting.prior, 0.0, rest, self.settings.seed());
+        Ok(first.into_iter().chain(random).collect())
+    }
+
+    fn print(&self, path: &Path, output: Option<&PathBuf>, fitted: &Fitted, report: Report) -> Result<()> {
+        let Fitted { observation, best, scores, seconds } = fitted;
+        let text = best.latent.to_json()?;
+        if report.is_json() {
+            let value = json!({
+                "picture": path.display().to_string(),
+                "output": output.map(|o| o.display().to_string()),
+                "known_share": observation.share(),
+                "loss": best.loss,
+                "losses": best.losses,
+                "ldr_psnr": scores.map(|s| s.psnr_ldr),
+                "hdr_psnr": scores.map(|s| s.psnr_hdr),
+                "ssim": scores.map(|s| s.ssim_ldr),
+                "seconds": seconds,
+                "latent": serde_json::from_str::<serde_json::Value>(&text)?,
+            });
+            return report.result("", &value);
+        }
+        let Some(output) = output else { return to_stdout(format!("{text}\n").as_bytes()) };
+        let stops = best.latent.log_exposure / std::f32::consts::LN_2;
+        let n = best.latent.vectors.len();
+        let known = 100.0 * observation.share();
+        let quality = match scores {
+            Some(s) => format!("LDR PSNR {:.1} dB", s.psnr_ldr),
+            None => format!("{known:.0} % of the sphere known"),
+        };
+        let starts = match best.all.len() {
+            1 => String::new(),
+            count => format!(", best of {count} starts"),
+        };
+        report.result(
+            format!(
+                "{}: {n} vectors, exposure {stops:+.2} stops, loss {:.4}, {quality}{starts} ({seconds:.1} s)",
+                output.display(),
+                best.loss
+            ),
+            &(),
+        )
+    }
+}
+
+impl Fitting<'_> {
+    fn encoded(&mut self, observation: &Observation) -> Result<Latent> {
+        if self.encoder.is_none() {
+            let veni = Veni::from_model(&self.loaded.model, &DeviceKind::Flex.device()?);
+            self.encoder = Some(veni.map_err(|e| e.in_file(&self.loaded.name))?);
+        }
+        let Some(veni) = &self.encoder else { bail!("no encoder") };
+        let found = veni.encode(observation.grid, &[&observation.log_radiance])?;
+        Ok(Latent::new(found.into_iter().next().map(|e| e.vectors).unwrap_or_default()))
+    }
+}
+
+/// The article's protocol, on the pixels that were fitted.
+fn score(decoder: &field::Decoder, latent: &Latent, seen: &Observation) -> Result<Scores> {
+    let Equirect { width, height } = seen.grid;
+    let mut decoded = vec![[0.0; 3]; seen.grid.len()];
+    decoder.condition(latent)?.log_radiance_batch(&seen.grid.directions(), &mut decoded);
+    Ok(scores(decoded.as_flattened(), &seen.log_radiance, height, width, Alignment::LogFactor))
+}

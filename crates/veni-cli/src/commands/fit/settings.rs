@@ -1,0 +1,203 @@
+//! How it is fitted.
+
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+use veni_core::fit::{FitConfig, Objective, Plateau};
+use veni_core::sphere::Equirect;
+use veni_core::train::loss::LossConfig;
+use veni_core::train::schedule::LearningRate;
+
+use crate::size::Size;
+
+/// Starts where part of the sphere is unknown: enough to see where they disagree.
+const STARTS: usize = 4;
+/// Weight of the prior there: what is unknown has nothing else to go by.
+const PRIOR: f64 = 0.02;
+/// A plateau: so many steps in which the loss falls by less than this fraction.
+const PLATEAU: Plateau = Plateau { patience: 50, improvement: 1e-3 };
+
+#[derive(Args, Debug)]
+pub(super) struct Settings {
+    /// What the following options start from
+    #[arg(long, value_enum, default_value_t)]
+    preset: Preset,
+
+    /// What is compared [default: the preset's]
+    #[arg(long, value_enum)]
+    objective: Option<ObjectiveName>,
+
+    /// Updates per start, at most [default: the preset's]
+    #[arg(long, value_name = "K")]
+    steps: Option<u64>,
+
+    /// Learning rate, or first and last of an exponential decay [default: the preset's]
+    #[arg(long, value_name = "RATE[:LAST]", value_parser = rate)]
+    rate: Option<(f64, Option<f64>)>,
+
+    /// Weight of the model's prior over latents; 0 turns it off [default: the preset's, or 0.02 where part of the
+    /// sphere is unknown]
+    #[arg(long, value_name = "WEIGHT")]
+    prior: Option<f64>,
+
+    /// Whether the exposure is found too [default: free where part of the sphere is unknown]
+    #[arg(long, value_enum)]
+    exposure: Option<Exposure>,
+
+    /// Where the first start is [default: the encoder's latent for whole panoramas, else zero]
+    #[arg(long, value_enum)]
+    start: Option<Start>,
+
+    /// Number of starts; all but the first are random [default: 1, or 4 where part of the sphere is unknown]
+    #[arg(long, value_name = "K")]
+    starts: Option<usize>,
+
+    /// Names the random starts
+    #[arg(long, default_value_t = 0, value_name = "S")]
+    seed: u64,
+
+    /// Go on to the last step, even when the loss no longer falls
+    #[arg(long)]
+    no_plateau: bool,
+
+    /// Size at which a panorama is fitted [default: 128x64, or 64x32 where part of it is unknown]
+    #[arg(long, value_name = "W|WxH")]
+    resolution: Option<Size>,
+}
+
+/// Named settings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Preset {
+    /// Log radiance, weighted by solid angle: 400 steps
+    #[default]
+    Thorough,
+    /// What is seen on a screen: the best LDR scores
+    Display,
+    /// The article's helper: 2000 steps from 1e-2 to 2e-3, unweighted, without a prior
+    Reference,
+    /// RENI++'s evaluation: cosine and scale-invariant error, 2500 steps
+    #[value(name = "reni++")]
+    Renipp,
+}
+
+/// The objectives by the names that are typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ObjectiveName {
+    /// Squared error of log radiance, by solid angle
+    Log,
+    /// Absolute error of log radiance: a sun that cannot be followed does not drag the rest along
+    Absolute,
+    /// Squared error of tonemapped values
+    Display,
+    /// Squared error of log radiance, every pixel alike
+    Reference,
+    /// RENI++'s: cosine and scale-invariant error
+    CosineScale,
+    /// The training losses of the article: gradients on several scales, scale-invariant error, colour
+    Training,
+}
+
+/// Whether the exposure is a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Exposure {
+    /// Found with the latent
+    Free,
+    /// Such that the picture's mean log luminance is the decoder's
+    Fixed,
+}
+
+/// The first start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Start {
+    /// What the encoder says
+    Encoder,
+    /// All vectors zero
+    Zero,
+    /// Drawn from the model's prior
+    Noise,
+}
+
+impl Settings {
+    pub(super) fn config(&self) -> Result<FitConfig> {
+        let mut config = match self.preset {
+            Preset::Thorough => FitConfig { plateau: Some(PLATEAU), ..FitConfig::thorough() },
+            Preset::Display => FitConfig { plateau: Some(PLATEAU), ..FitConfig::display() },
+            Preset::Reference => FitConfig::reference_helper(1e-2, 2e-3, 2000),
+            Preset::Renipp => FitConfig::reni_evaluation(),
+        };
+        if let Some(steps) = self.steps {
+            config = config.in_steps(steps);
+        }
+        if let Some((first, last)) = self.rate {
+            config.learning_rate = match (config.learning_rate, last) {
+                (LearningRate::Exponential { steps, warm_up, before, ramp, .. }, Some(last)) => {
+                    LearningRate::Exponential { rate: first, last, steps, warm_up, before, ramp }
+                }
+                _ => LearningRate::Constant { rate: first },
+            };
+        }
+        if let Some(objective) = self.objective {
+            config.objective = match objective {
+                ObjectiveName::Log => Objective::LogError,
+                ObjectiveName::Absolute => Objective::LogAbsolute,
+                ObjectiveName::Display => FitConfig::display().objective,
+                ObjectiveName::Reference => Objective::ReferenceLogError,
+                ObjectiveName::CosineScale => Objective::CosineScaleInvariant,
+                ObjectiveName::Training => Objective::Terms(LossConfig::default()),
+            };
+        }
+        if let Some(weight) = self.prior {
+            config.prior = weight;
+        }
+        if self.no_plateau {
+            config.plateau = None;
+        }
+        config.check()?;
+        Ok(config)
+    }
+
+    /// What depends on whether part of the sphere is unknown.
+    pub(super) fn adapted(&self, config: FitConfig, partial: bool) -> FitConfig {
+        let prior = match (self.prior, self.preset) {
+            (None, Preset::Thorough | Preset::Display) if partial => PRIOR,
+            _ => config.prior,
+        };
+        let free_exposure = self.exposure.map_or(partial, |e| e == Exposure::Free);
+        FitConfig { prior, free_exposure, ..config }
+    }
+
+    /// The first start, and how many there are.
+    pub(super) fn start(&self, whole: bool, has_encoder: bool) -> (Start, usize) {
+        let start = match self.start {
+            Some(start) => start,
+            None if whole && has_encoder && self.preset != Preset::Renipp => Start::Encoder,
+            None => Start::Zero,
+        };
+        let default = if whole { 1 } else { STARTS };
+        (start, self.starts.unwrap_or(default).max(1))
+    }
+
+    pub(super) fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Where a panorama is fitted.
+    pub(super) fn grid(&self, partial: bool) -> Result<Equirect> {
+        let (width, height) = match self.resolution {
+            Some(size) => size.equirect().context("--resolution")?,
+            None if partial => (64, 32),
+            None => (128, 64),
+        };
+        Ok(Equirect::new(width, height))
+    }
+}
+
+fn rate(text: &str) -> Result<(f64, Option<f64>), String> {
+    let number = |t: &str| match t.trim().parse::<f64>() {
+        Ok(v) if v.is_finite() && v > 0.0 => Ok(v),
+        _ => Err(format!("'{t}' is no learning rate: give a number above 0, or two as 0.05:0.002")),
+    };
+    match text.split_once(':') {
+        Some((first, last)) => Ok((number(first)?, Some(number(last)?))),
+        None => Ok((number(text)?, None)),
+    }
+}

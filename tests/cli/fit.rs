@@ -1,0 +1,205 @@
+//! `fit`: whole panoramas, holes, photographs, starts, and what cannot be fitted.
+
+use image::{GrayImage, Luma, RgbImage, RgbaImage};
+use serde_json::Value;
+
+use crate::readers;
+use crate::util::{Dir, model, panorama};
+
+/// A baked sky without its latent, 64 × 32, as an EXR of another writer's, alpha included where `alpha` says so.
+fn sky(dir: &Dir, name: &str, alpha: Option<fn(usize) -> f32>) -> readers::Image {
+    let args =
+        ["bake", "--model", model(), "--seed", "5", "--size", "64", "--float", "-q", "-o", "latent.exr"];
+    dir.ok(&[&args[..], &["--force"]].concat());
+    let image = readers::exr(&dir.path("latent.exr"));
+    let pixel = |x: usize, y: usize| image.pixels[y * 64 + x];
+    match alpha {
+        None => exr::prelude::write_rgb_file(dir.path(name), 64, 32, |x, y| pixel(x, y).into()).unwrap(),
+        Some(alpha) => exr::prelude::write_rgba_file(dir.path(name), 64, 32, |x, y| {
+            let [r, g, b] = pixel(x, y);
+            (r, g, b, alpha(x))
+        })
+        .unwrap(),
+    }
+    image
+}
+
+fn fit(dir: &Dir, args: &[&str]) -> Value {
+    let [value] = &dir.json(&[&["fit", "--model", model(), "--steps", "40"], args].concat())[..] else {
+        panic!("one object")
+    };
+    value.clone()
+}
+
+/// What the command line itself refuses, with its own message.
+fn mistyped(dir: &Dir, args: &[&str], word: &str) {
+    let run = dir.run(&[&["fit", "--model", model()], args].concat());
+    assert_eq!(run.code, Some(2), "{args:?}");
+    assert!(run.err.contains(word) && run.out.is_empty(), "{args:?}: {}", run.err);
+}
+
+#[test]
+fn a_sky_of_the_model_is_found_again() {
+    let dir = Dir::new();
+    sky(&dir, "sky.exr", None);
+    let found = fit(&dir, &["sky.exr", "-o", "sky.json", "--resolution", "32x16"]);
+    assert_eq!(found["latent"]["n"], 4);
+    assert_eq!(found["losses"].as_array().unwrap().len(), 1);
+    assert_eq!(found["known_share"].as_f64().unwrap().round(), 1.0);
+    // better than the encoder of a model that has hardly been trained
+    let [encoded] = &dir.json(&["encode", "sky.exr", "--model", model()])[..] else { panic!("one object") };
+    let psnr = |v: &Value| v["ldr_psnr"].as_f64().unwrap();
+    assert!(psnr(&found) > psnr(encoded), "{} {}", psnr(&found), psnr(encoded));
+    // and the file is a latent that can be baked
+    let out = dir.ok(&["bake", "sky.json", "--model", model(), "--size", "32", "-o", "again.exr"]);
+    assert!(out.contains("again.exr"), "{out}");
+    let printed = dir.ok(&["fit", "sky.exr", "--model", model(), "--steps", "2", "-q"]);
+    assert_eq!(serde_json::from_str::<Value>(&printed).unwrap()["source"], "sky.exr");
+}
+
+#[test]
+fn every_preset_and_objective_runs_and_seeds_name_starts() {
+    let dir = Dir::new();
+    let loss = |args: &[&str]| {
+        let common = ["fit", &panorama(), "--model", model(), "--resolution", "32x16", "--steps", "3"];
+        let [value] = &dir.json(&[&common[..], args].concat())[..] else { panic!("one object") };
+        let loss = value["loss"].as_f64().unwrap();
+        assert!(loss.is_finite() && loss > 0.0, "{args:?}");
+        loss
+    };
+    for preset in ["thorough", "display", "reference", "reni++"] {
+        loss(&["--preset", preset]);
+    }
+    for objective in ["log", "absolute", "display", "reference", "cosine-scale", "training"] {
+        loss(&["--objective", objective]);
+    }
+    let noise = |seed: &str| loss(&["--start", "noise", "--seed", seed]);
+    assert_eq!(noise("1"), noise("1"));
+    assert!(noise("1") != noise("2"));
+    let few = loss(&["--start", "noise", "--seed", "1"]);
+    assert!(loss(&["--start", "noise", "--seed", "1", "--starts", "4"]) <= few);
+    assert!(loss(&["--rate", "0.2:0.1"]) != loss(&["--rate", "0.001"]));
+}
+
+#[test]
+fn holes_are_completed_and_doubted() {
+    let dir = Dir::new();
+    // the right half is missing: by alpha, by a mask, by NaN
+    let truth = sky(&dir, "alpha.exr", Some(|x| if x < 32 { 1.0 } else { 0.0 }));
+    sky(&dir, "whole.exr", None);
+    GrayImage::from_fn(64, 32, |x, _| Luma([if x < 32 { 255 } else { 0 }]))
+        .save(dir.path("mask.png"))
+        .unwrap();
+    exr::prelude::write_rgb_file(dir.path("nan.exr"), 64, 32, |x, y| {
+        let [r, g, b] = truth.pixels[y * 64 + x];
+        if x < 32 { (r, g, b) } else { (f32::NAN, g, b) }
+    })
+    .unwrap();
+    let images = ["--completed", "whole-again.exr", "--uncertainty", "doubt.exr", "--force"];
+    let common = ["--resolution", "32x16", "-o", "a.json"];
+    let alpha = fit(&dir, &[&["alpha.exr"], &common[..], &images[..]].concat());
+    assert!((alpha["known_share"].as_f64().unwrap() - 0.5).abs() < 1e-3);
+    assert_eq!(alpha["losses"].as_array().unwrap().len(), 4);
+    assert_eq!(alpha["ldr_psnr"], Value::Null, "half a panorama has no score");
+    let completed = readers::exr(&dir.path("whole-again.exr"));
+    let doubt = readers::exr(&dir.path("doubt.exr"));
+    assert_eq!(completed.pixels.len(), 64 * 32);
+    let mut off = 0;
+    for (p, (found, true_value)) in completed.pixels.iter().zip(&truth.pixels).enumerate() {
+        let close = (0..3).all(|c| (found[c] - true_value[c]).abs() <= 1e-4 * true_value[c]);
+        assert!(p % 64 >= 32 || close, "what is known stays: {found:?} {true_value:?}");
+        off += usize::from(!close);
+    }
+    assert!(off > 500, "what is unknown is not copied from what was hidden");
+    let mean = |side: usize| {
+        let values = doubt.pixels.iter().enumerate().filter(|(p, _)| (p % 64 >= 32) == (side == 1));
+        values.map(|(_, v)| f64::from(v[0])).sum::<f64>() / 1024.0
+    };
+    assert!(mean(1) > mean(0), "{} {}", mean(0), mean(1));
+    for other in [&["whole.exr", "--mask", "mask.png"][..], &["nan.exr"]] {
+        let found = fit(&dir, &[other, &common[..], &["--force"]].concat());
+        let (a, b) = (found["loss"].as_f64().unwrap(), alpha["loss"].as_f64().unwrap());
+        assert!((a - b).abs() < 1e-5 * b, "{other:?}: {a} {b}");
+    }
+    dir.ok(&[
+        "fit",
+        "alpha.exr",
+        "--model",
+        model(),
+        "--steps",
+        "2",
+        "-o",
+        "b.json",
+        "--uncertainty",
+        "heat.png",
+    ]);
+    assert_eq!(image::open(dir.path("heat.png")).unwrap().to_rgb8().dimensions(), (64, 32));
+}
+
+#[test]
+fn a_photograph_is_placed_where_it_was_taken() {
+    let dir = Dir::new();
+    let red = |x: u32, _| if x < 30 { image::Rgb([255, 40, 40]) } else { image::Rgb([120, 120, 120]) };
+    RgbImage::from_fn(60, 40, red).save(dir.path("photo.png")).unwrap();
+    RgbImage::from_fn(60, 40, red).save(dir.path("photo.jpg")).unwrap();
+    let view = [
+        "--fov",
+        "60",
+        "--look",
+        "90,20",
+        "-o",
+        "p.json",
+        "--force",
+        "--completed",
+        "p.exr",
+        "--size",
+        "128",
+    ];
+    for name in ["photo.png", "photo.jpg"] {
+        let found = fit(&dir, &[&[name], &view[..]].concat());
+        let share = found["known_share"].as_f64().unwrap();
+        assert!((0.04..0.1).contains(&share), "{share}");
+        // azimuth 90°: a quarter from the left; red on the photograph's left, so further left
+        let image = readers::exr(&dir.path("p.exr"));
+        let at = |x: usize, y: usize| image.pixels[y * 128 + x];
+        let reddish = |[r, g, _]: [f32; 3]| r > 3.0 * g;
+        assert!(reddish(at(27, 25)) && !reddish(at(37, 25)), "{:?} {:?}", at(27, 25), at(37, 25));
+    }
+    // a transparent picture shows nothing
+    RgbaImage::new(60, 40).save(dir.path("clear.png")).unwrap();
+    let refused = |args: &[&str], words: &[&str]| {
+        dir.refused(&[&["fit", "--model", model(), "-q"], args].concat(), words);
+    };
+    refused(&["clear.png", "--fov", "60"], &["clear.png", "nothing"]);
+    refused(&["photo.png"], &["photo.png", "twice its height"]);
+    refused(&["photo.png", "--fov", "180"], &["180"]);
+    mistyped(&dir, &["photo.png", "--fov", "60", "--look", "0,91"], "zenith");
+    mistyped(&dir, &["photo.png", "--look", "0"], "--fov");
+    refused(&["photo.png", "--fov", "60", "--start", "encoder"], &["encoder", "--start"]);
+    refused(&["photo.png", "--fov", "60", "--objective", "training"], &["whole panoramas"]);
+}
+
+#[test]
+fn what_cannot_be_fitted_is_refused_before_any_work() {
+    let dir = Dir::new();
+    let sky = panorama();
+    GrayImage::new(3, 2).save(dir.path("small.png")).unwrap();
+    dir.write("broken.png", b"\x89PNG\r\n\x1a\nnothing");
+    dir.write("text.exr", "no image");
+    dir.write("there.json", "{}");
+    let refused = |args: &[&str], words: &[&str]| {
+        dir.refused(&[&["fit", "--model", model(), "-q"], args].concat(), words);
+    };
+    refused(&[&sky, "--mask", "small.png"], &["small.png", "3 x 2"]);
+    refused(&[&sky, "--mask", "text.exr"], &["text.exr", "PNG"]);
+    refused(&["broken.png"], &["broken.png"]);
+    refused(&["text.exr"], &["text.exr"]);
+    refused(&["missing.exr"], &["missing.exr"]);
+    refused(&[&sky, "-o", "there.json"], &["there.json", "--force"]);
+    refused(&[&sky, &sky, "-o", "a.json"], &["--out-dir"]);
+    refused(&[&sky, &sky, "--out-dir", "d", "--completed", "c.exr"], &["--completed"]);
+    refused(&[&sky, "-o", "a.json", "--uncertainty", "u.exr", "--steps", "1"], &["--starts"]);
+    refused(&[&sky, "--prior=-1"], &["prior = -1"]);
+    refused(&[&sky, "--resolution", "32x32"], &["--resolution"]);
+    mistyped(&dir, &[&sky, "--rate", "0"], "learning rate");
+}
