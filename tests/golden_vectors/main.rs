@@ -25,6 +25,7 @@ mod metrics;
 mod report;
 mod schedules;
 mod self_test;
+mod shading;
 mod training;
 mod vectors;
 
@@ -56,6 +57,7 @@ pub(crate) const FAMILIES: &[Family] = &[
     schedules::run,
     training::run,
     fit::run,
+    shading::run,
     image_loading::run,
 ];
 
