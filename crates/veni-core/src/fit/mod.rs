@@ -9,6 +9,7 @@ mod config;
 mod network;
 mod observation;
 mod pixel;
+mod shaded;
 mod starts;
 mod target;
 #[cfg(test)]
@@ -18,6 +19,7 @@ mod whole;
 pub use config::{FitConfig, Objective, Plateau};
 pub use network::FitDecoder;
 pub use observation::{Observation, Picture};
+pub use shaded::fit_shaded;
 pub use starts::{Best, best_of, random_starts};
 pub use target::FitTarget;
 
@@ -69,22 +71,30 @@ pub fn fit_watched<'a>(
     target.check()?;
     let n = decoder.latent_vectors();
     check_starts(start, target.images.len(), n)?;
-    if let Some(prior) = target.prior.filter(|p| p.latent_vectors() != n) {
-        return Err(Error::invalid(format!(
-            "a prior of {} vectors, the decoder takes {n}",
-            prior.latent_vectors()
-        )));
-    }
+    check_prior(target.prior, n)?;
     let loss = image_loss(decoder, target, config)?;
     let network = Network::new(decoder, target.directions());
+    optimise(&network, &loss, target.prior, start, config, watch)
+}
+
+/// Adam on latents and exposures.
+fn optimise(
+    network: &Network<'_>,
+    loss: &ImageLoss<'_>,
+    prior: Option<&Prior>,
+    start: &[Latent],
+    config: &FitConfig,
+    watch: &mut dyn FnMut(u64, f64),
+) -> Result<FitResult> {
+    let n = start.first().map_or(0, |z| z.vectors.len());
     let flat = start.iter().flat_map(|z| z.vectors.as_flattened()).copied();
     let mut vectors = Variable::new(flat.collect(), config.epsilon);
     let mut exposures = Variable::new(start.iter().map(|z| z.log_exposure).collect(), config.epsilon);
     let mut losses = Vec::with_capacity(config.steps as usize);
     let mut stall = Stall::new(config.plateau, start.len());
     for step in 0..config.steps {
-        let mut found = network.evaluate(&latents(&vectors, &exposures, n), &loss)?;
-        add_prior(config.prior, target.prior, &vectors.values, n, &mut found);
+        let mut found = network.evaluate(&latents(&vectors, &exposures, n), loss)?;
+        add_prior(config.prior, prior, &vectors.values, n, &mut found);
         let value = found.losses.iter().sum::<f64>() / found.losses.len() as f64;
         if !value.is_finite() {
             return Err(Error::invalid(format!(
@@ -103,7 +113,7 @@ pub fn fit_watched<'a>(
         }
     }
     let latents = latents(&vectors, &exposures, n);
-    let last = network.losses(&latents, &loss)?;
+    let last = network.losses(&latents, loss)?;
     Ok(FitResult { latents, losses, last })
 }
 
@@ -118,6 +128,13 @@ fn check_starts(start: &[Latent], images: usize, n: usize) -> Result<()> {
         )));
     }
     start.iter().try_for_each(Latent::check_finite)
+}
+
+fn check_prior(prior: Option<&Prior>, n: usize) -> Result<()> {
+    match prior.map(Prior::latent_vectors) {
+        Some(m) if m != n => Err(Error::invalid(format!("a prior of {m} vectors, the decoder takes {n}"))),
+        _ => Ok(()),
+    }
 }
 
 fn image_loss<'a>(

@@ -7,6 +7,7 @@ use super::pixel::PixelLoss;
 use super::whole::WholeLoss;
 use crate::field;
 use crate::latent::Latent;
+use crate::shade::ShadedImage;
 use crate::vae;
 use crate::{Error, Result};
 
@@ -56,6 +57,8 @@ pub(super) enum ImageLoss<'a> {
     Pixels(Vec<PixelLoss<'a>>),
     /// All images together.
     Whole(WholeLoss),
+    /// The light of each latent through the surface of a photograph; the exposure is the photograph's affair.
+    Shaded(&'a [ShadedImage]),
 }
 
 /// The losses at some latents, and their slopes.
@@ -98,87 +101,148 @@ impl<'a> Network<'a> {
     pub(super) fn evaluate(&self, latents: &[Latent], loss: &ImageLoss<'_>) -> Result<Evaluation> {
         match self {
             Self::Folded { decoder, directions, device } => {
-                let fields: Vec<_> = latents.iter().map(|z| decoder.condition(z)).collect::<Result<_>>()?;
-                let found: Vec<_> = match loss {
-                    ImageLoss::Pixels(images) => fields
-                        .iter()
-                        .zip(images)
-                        .map(|(field, image)| {
-                            field.gradient(directions, |i, p| {
-                                let (value, slope) = image.at(i, p.map(f64::from));
-                                (value, slope.map(|s| s as f32))
-                            })
-                        })
-                        .collect(),
-                    ImageLoss::Whole(whole) => {
-                        let prediction = decoded(&fields, directions, whole.shape(), device).require_grad();
-                        let value = whole.of(prediction.clone());
-                        let gradients = value.clone().backward();
-                        let slopes = numbers(prediction.grad(&gradients).ok_or_else(unconnected)?);
-                        let value = f64::from(value.into_scalar::<f32>());
-                        let slopes = slopes.as_chunks::<3>().0.chunks_exact(directions.len());
-                        let run = |(field, slopes): (&field::Field, &[[f64; 3]])| {
-                            let mut g = field.gradient(directions, |i, _| (0.0, slopes[i].map(|s| s as f32)));
-                            g.loss = value;
-                            g
-                        };
-                        fields.iter().zip(slopes).map(run).collect()
-                    }
-                };
-                let flat = |g: &field::Gradient| g.vectors.as_flattened().to_vec();
-                Ok(Evaluation {
-                    losses: found.iter().map(|g| g.loss).collect(),
-                    vectors: found.iter().flat_map(flat).map(f64::from).collect(),
-                    exposures: found.iter().map(|g| f64::from(g.log_exposure)).collect(),
-                })
+                let bare = matches!(loss, ImageLoss::Shaded(_));
+                let fields = conditioned(decoder, latents, bare)?;
+                folded(&fields, directions, device, latents, loss)
             }
-            Self::Graph { device, .. } => {
-                let (z, s) =
-                    (vectors(latents, device).require_grad(), exposures(latents, device).require_grad());
-                let prediction = self.forward(z.clone(), s.clone());
-                let (losses, gradients) = match loss {
-                    ImageLoss::Whole(whole) => {
-                        let value = whole.of(prediction.reshape(whole.shape()));
-                        let gradients = value.clone().backward();
-                        (vec![f64::from(value.into_scalar::<f32>()); latents.len()], gradients)
-                    }
-                    ImageLoss::Pixels(images) => {
-                        let (losses, slopes) = slopes(&numbers(prediction.clone()), images);
-                        let slopes = Tensor::from_data(TensorData::new(slopes, prediction.dims()), device);
-                        (losses, (prediction * slopes).sum().backward())
-                    }
-                };
-                Ok(Evaluation {
-                    losses,
-                    vectors: numbers(z.grad(&gradients).ok_or_else(unconnected)?),
-                    exposures: numbers(s.grad(&gradients).ok_or_else(unconnected)?),
-                })
+            Self::Graph { decoder, directions, device } => {
+                graph(&|z| decoder.forward(z, directions.clone()), device, latents, loss)
             }
         }
     }
 
     /// The loss of each image alone.
     pub(super) fn losses(&self, latents: &[Latent], loss: &ImageLoss<'_>) -> Result<Vec<f64>> {
+        let bare = matches!(loss, ImageLoss::Shaded(_));
         let prediction: Tensor<3> = match self {
             Self::Folded { decoder, directions, device } => {
-                let fields: Vec<_> = latents.iter().map(|z| decoder.condition(z)).collect::<Result<_>>()?;
+                let fields = conditioned(decoder, latents, bare)?;
                 decoded(&fields, directions, [latents.len(), 1, directions.len(), 3], device).squeeze_dim(1)
             }
-            Self::Graph { device, .. } => self.forward(vectors(latents, device), exposures(latents, device)),
+            Self::Graph { decoder, directions, device } => {
+                let prediction = decoder.forward(vectors(latents, device), directions.clone());
+                if bare { prediction } else { prediction + exposures(latents, device) }
+            }
         };
         Ok(match loss {
             ImageLoss::Whole(whole) => whole.each(&prediction.reshape(whole.shape())),
             ImageLoss::Pixels(images) => slopes(&numbers(prediction), images).0,
+            ImageLoss::Shaded(images) => lit(&numbers(prediction), images, latents).losses,
         })
     }
+}
 
-    /// Log radiance [B, R, 3]; of the graph only.
-    fn forward(&self, z: Tensor<3>, s: Tensor<3>) -> Tensor<3> {
-        match self {
-            Self::Graph { decoder, directions, .. } => decoder.forward(z, directions.clone()) + s,
-            Self::Folded { .. } => unreachable!("a folded decoder has no graph"),
+/// By the folded fields' own gradients.
+fn folded(
+    fields: &[field::Field],
+    directions: &[[f32; 3]],
+    device: &Device,
+    latents: &[Latent],
+    loss: &ImageLoss<'_>,
+) -> Result<Evaluation> {
+    // a loss over the whole image is known before any gradient: its slopes are handed to each field
+    let with_slopes = |slopes: &[f64]| -> Vec<field::Gradient> {
+        let each = fields.iter().zip(slopes.as_chunks::<3>().0.chunks_exact(directions.len()));
+        each.map(|(field, slopes)| field.gradient(directions, |i, _| (0.0, slopes[i].map(|s| s as f32))))
+            .collect()
+    };
+    let shape = [fields.len(), 1, directions.len(), 3];
+    let mut found = Evaluation::default();
+    let gradients: Vec<_> = match loss {
+        ImageLoss::Pixels(images) => {
+            let each = fields.iter().zip(images).map(|(field, image)| {
+                field.gradient(directions, |i, p| {
+                    let (value, slope) = image.at(i, p.map(f64::from));
+                    (value, slope.map(|s| s as f32))
+                })
+            });
+            let gradients: Vec<_> = each.collect();
+            found.losses = gradients.iter().map(|g| g.loss).collect();
+            gradients
         }
+        ImageLoss::Whole(whole) => {
+            let prediction = decoded(fields, directions, whole.shape(), device).require_grad();
+            let value = whole.of(prediction.clone());
+            let gradients = value.clone().backward();
+            let slopes = numbers(prediction.grad(&gradients).ok_or_else(unconnected)?);
+            found.losses = vec![f64::from(value.into_scalar::<f32>()); fields.len()];
+            with_slopes(&slopes)
+        }
+        ImageLoss::Shaded(images) => {
+            let lit = lit(&numbers(decoded(fields, directions, shape, device)), images, latents);
+            let gradients = with_slopes(&lit.vectors);
+            found = Evaluation { vectors: Vec::new(), ..lit };
+            gradients
+        }
+    };
+    let flat = |g: &field::Gradient| g.vectors.as_flattened().to_vec();
+    found.vectors = gradients.iter().flat_map(flat).map(f64::from).collect();
+    if found.exposures.is_empty() {
+        found.exposures = gradients.iter().map(|g| f64::from(g.log_exposure)).collect();
     }
+    Ok(found)
+}
+
+/// By the tensor graph.
+fn graph(
+    decode: &dyn Fn(Tensor<3>) -> Tensor<3>,
+    device: &Device,
+    latents: &[Latent],
+    loss: &ImageLoss<'_>,
+) -> Result<Evaluation> {
+    let (z, s) = (vectors(latents, device).require_grad(), exposures(latents, device).require_grad());
+    let constant = |slopes: Vec<f64>, like: &Tensor<3>| -> Tensor<3> {
+        Tensor::from_data(TensorData::new(slopes, like.dims()), device)
+    };
+    let (losses, gradients) = match loss {
+        ImageLoss::Whole(whole) => {
+            let value = whole.of((decode(z.clone()) + s.clone()).reshape(whole.shape()));
+            let gradients = value.clone().backward();
+            (vec![f64::from(value.into_scalar::<f32>()); latents.len()], gradients)
+        }
+        ImageLoss::Pixels(images) => {
+            let prediction = decode(z.clone()) + s.clone();
+            let (losses, slopes) = slopes(&numbers(prediction.clone()), images);
+            let slopes = constant(slopes, &prediction);
+            (losses, (prediction * slopes).sum().backward())
+        }
+        ImageLoss::Shaded(images) => {
+            let prediction = decode(z.clone());
+            let lit = lit(&numbers(prediction.clone()), images, latents);
+            let slopes = constant(lit.vectors, &prediction);
+            let gradients = (prediction * slopes).sum().backward();
+            let vectors = numbers(z.grad(&gradients).ok_or_else(unconnected)?);
+            return Ok(Evaluation { losses: lit.losses, vectors, exposures: lit.exposures });
+        }
+    };
+    Ok(Evaluation {
+        losses,
+        vectors: numbers(z.grad(&gradients).ok_or_else(unconnected)?),
+        exposures: numbers(s.grad(&gradients).ok_or_else(unconnected)?),
+    })
+}
+
+/// Fields at the latents' exposures, or at exposure 0.
+fn conditioned(decoder: &field::Decoder, latents: &[Latent], bare: bool) -> Result<Vec<field::Field>> {
+    let one = |z: &Latent| match bare {
+        true => decoder.condition(&Latent { log_exposure: 0.0, ..z.clone() }),
+        false => decoder.condition(z),
+    };
+    latents.iter().map(one).collect()
+}
+
+/// The photographs' losses, with slopes by all log radiance (in `vectors`) and by exposures.
+fn lit(prediction: &[f64], images: &[ShadedImage], latents: &[Latent]) -> Evaluation {
+    let light: Vec<[f32; 3]> = prediction.as_chunks::<3>().0.iter().map(|p| p.map(|v| v as f32)).collect();
+    let each = images.iter().zip(light.chunks_exact(light.len() / images.len())).zip(latents);
+    let mut out = Evaluation::default();
+    for ((image, light), latent) in each {
+        let (loss, slopes, exposure) = image.evaluate(light, latent.log_exposure);
+        out.losses.push(loss);
+        out.vectors.extend(slopes.as_flattened().iter().map(|s| f64::from(*s)));
+        out.exposures.push(exposure);
+    }
+    out
 }
 
 fn unconnected() -> Error {

@@ -9,12 +9,12 @@ use crate::sphere::Equirect;
 use crate::train::loss::LossConfig;
 use crate::vae::{Decoder, veni::model_of, weights};
 
-fn decoder() -> Decoder {
+pub(super) fn decoder() -> Decoder {
     let config = DecoderConfig { hidden: 16, layers: 2, heads: 2, ..DecoderConfig::default() };
     Decoder::new(&config, 3, &mut stream(1, Purpose::Weights, 0, 0), &Device::flex())
 }
 
-fn latent(seed: u64) -> Latent {
+pub(super) fn latent(seed: u64) -> Latent {
     let mut rng = stream(seed, Purpose::Fit, 0, 0);
     Latent::new((0..3).map(|_| [0; 3].map(|_| normal(&mut rng) as f32)).collect())
 }
@@ -77,7 +77,7 @@ fn what_does_not_fit_together_is_refused() {
 }
 
 /// The same decoder as a model, whose folded form takes the fast way.
-fn model(decoder: &Decoder) -> Model {
+pub(super) fn model(decoder: &Decoder) -> Model {
     let config = DecoderConfig { hidden: 16, layers: 2, heads: 2, ..DecoderConfig::default() };
     let config = ModelConfig { decoder: config, ..ModelConfig::decode_only(3) };
     model_of(weights::read(decoder, "decoder."), &config, ModelInfo::default()).unwrap()

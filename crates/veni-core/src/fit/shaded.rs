@@ -1,0 +1,106 @@
+//! The light on a photographed surface: the latent under which its rendering is the photograph.
+
+use super::network::{ImageLoss, Network};
+use super::{FitConfig, FitDecoder, FitResult, check_prior, check_starts, optimise};
+use crate::latent::{Latent, Prior};
+use crate::shade::ShadedImage;
+use crate::{Error, Result};
+
+/// Optimises one latent per image from `start`. Each image's loss is its own
+/// ([`ShadedLoss`](crate::shade::ShadedLoss)): [`FitConfig::objective`] is not looked at. All must have the same lights, those the
+/// decoder is asked for. A latent's log exposure is the number that the image's
+/// [`ExposureForm`](crate::shade::ExposureForm) takes. `watch` gets the number of updates made and the mean loss.
+///
+/// # Errors
+/// [`Error::Invalid`] if the numbers of images and starts or their sizes disagree, if there are none, if lights
+/// differ, or if the loss is no longer finite.
+pub fn fit_shaded<'a>(
+    decoder: impl Into<FitDecoder<'a>>,
+    images: &[ShadedImage],
+    prior: Option<&Prior>,
+    start: &[Latent],
+    config: &FitConfig,
+    watch: &mut dyn FnMut(u64, f64),
+) -> Result<FitResult> {
+    let decoder = decoder.into();
+    config.check()?;
+    let n = decoder.latent_vectors();
+    let Some(first) = images.first() else { return Err(Error::invalid("0 images to fit")) };
+    check_starts(start, images.len(), n)?;
+    check_prior(prior, n)?;
+    let lights = first.transfer().lights();
+    if images.iter().any(|image| image.transfer().lights() != lights) {
+        return Err(Error::invalid("images that are fitted together must be lit by the same lights"));
+    }
+    let network = Network::new(decoder, lights.directions().to_vec());
+    optimise(&network, &ImageLoss::Shaded(images), prior, start, config, watch)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{decoder, latent, model};
+    use super::*;
+    use crate::shade::{
+        Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedLoss, ShadingForm, Surface, Transfer,
+    };
+    use crate::sphere::Equirect;
+
+    /// A glossy ball under the light of a latent.
+    fn ball(seed: u64, exposure: f32) -> ShadedImage {
+        let place = ([0.0; 3], 1.0);
+        let camera = Camera::framing(place, [0.0; 2], REFERENCE_FIELD_OF_VIEW, [20, 20], 0.05).unwrap();
+        let surface = Surface::sphere(&camera, place, 20, 20).unwrap();
+        let material = Material::blinn_phong(Colour::Uniform([0.8; 3]), 0.5, 40.0);
+        let lights = Lights::equirect(Equirect::new(16, 8));
+        let transfer = Transfer::new(&surface, &material, lights, ShadingForm::Physical).unwrap();
+        let light = Latent { log_exposure: exposure, ..latent(seed) };
+        let field = model(&decoder()).decoder().unwrap().condition(&light).unwrap();
+        let photograph = transfer.render(&field.bake(Equirect::new(16, 8)));
+        ShadedImage::new(transfer, &photograph, ShadedLoss::default()).unwrap()
+    }
+
+    #[test]
+    fn the_true_light_is_a_perfect_fit_and_a_near_one_is_drawn_to_it() {
+        let decoder = model(&decoder()).decoder().unwrap();
+        let image = [ball(1, 0.4)];
+        let config = FitConfig { prior: 0.0, free_exposure: true, steps: 200, ..FitConfig::thorough() };
+        let truth = Latent { log_exposure: 0.4, ..latent(1) };
+        let none = FitConfig { steps: 0, ..config };
+        let exact = fit_shaded(&decoder, &image, None, &[truth.clone()], &none, &mut |_, _| {}).unwrap();
+        assert!(exact.last[0] < 1e-9, "{}", exact.last[0]);
+        let mut near = truth;
+        near.vectors.as_flattened_mut().iter_mut().for_each(|v| *v += 0.05);
+        near.log_exposure = 0.0;
+        let mut calls = 0;
+        let found = fit_shaded(&decoder, &image, None, &[near], &config, &mut |_, _| calls += 1).unwrap();
+        assert!(found.last[0] < 0.01 * found.losses[0], "{} of {}", found.last[0], found.losses[0]);
+        assert!((found.latents[0].log_exposure - 0.4).abs() < 0.1 && calls == 200);
+    }
+
+    #[test]
+    fn the_fast_way_and_the_graph_agree() {
+        let graph = decoder();
+        let fast = model(&graph).decoder().unwrap();
+        let images = [ball(1, 0.0), ball(2, 0.3)];
+        let start = [3, 4].map(latent);
+        let config = FitConfig { free_exposure: true, steps: 4, ..FitConfig::thorough() };
+        let a = fit_shaded(&fast, &images, None, &start, &config, &mut |_, _| {}).unwrap();
+        let b = fit_shaded(&graph, &images, None, &start, &config, &mut |_, _| {}).unwrap();
+        for (a, b) in a.losses.iter().chain(&a.last).zip(b.losses.iter().chain(&b.last)) {
+            assert!((a - b).abs() < 1e-4 * (1e-3 + b), "{a} {b}");
+        }
+        let close = |a: f32, b: f32| (a - b).abs() < 2e-3;
+        assert!(a.latents.iter().zip(&b.latents).all(|(a, b)| close(a.log_exposure, b.log_exposure)));
+    }
+
+    #[test]
+    fn images_of_other_lights_and_missing_starts_are_refused() {
+        let decoder = model(&decoder()).decoder().unwrap();
+        let config = FitConfig::thorough();
+        let refused = |images: &[ShadedImage], start: &[Latent]| {
+            fit_shaded(&decoder, images, None, start, &config, &mut |_, _| {}).unwrap_err().to_string()
+        };
+        assert!(refused(&[], &[]).contains("0 images"));
+        assert!(refused(&[ball(1, 0.0)], &[]).contains("0 latents"));
+    }
+}
