@@ -5,7 +5,7 @@
 //! [`model`] (the weight file) and [`field`] (the decoder folded for one latent).
 //!
 //! The **learning world** (feature `learn`, on by default) is built on burn: `nn` (equivariant
-//! layers), `vae` (encoder and decoder), `data`, `train`, `fit` and `eval`. It uses the
+//! layers), `vae` (encoder and decoder), `data`, `train`, `fit`, `eval` and `baseline`. It uses the
 //! lighting world and never the reverse; the bridge between them is the model file.
 
 pub mod error;
@@ -16,6 +16,8 @@ pub mod output;
 pub mod panorama;
 pub mod sphere;
 
+#[cfg(feature = "learn")]
+pub mod baseline;
 #[cfg(feature = "learn")]
 pub mod data;
 #[cfg(feature = "learn")]
