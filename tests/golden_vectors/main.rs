@@ -7,6 +7,7 @@
 //! With the feature `gpu`, the fields are computed by the GPU decoder too ([`gpu`]).
 //! `VENI_GOLDEN_VERBOSE` lists how much of its tolerance every tensor uses.
 
+mod baselines;
 mod case;
 mod compare;
 mod directions;
@@ -59,6 +60,7 @@ pub(crate) const FAMILIES: &[Family] = &[
     fit::run,
     shading::run,
     image_loading::run,
+    baselines::run,
 ];
 
 /// The folder of case files.

@@ -6,7 +6,7 @@
 //! light).
 //!
 //! The **learning world** (feature `learn`, on by default) is built on burn: `nn` (equivariant
-//! layers), `vae` (encoder and decoder), `data`, `train`, `fit` and `eval`. It uses the
+//! layers), `vae` (encoder and decoder), `data`, `train`, `fit`, `eval` and `baseline`. It uses the
 //! lighting world and never the reverse; the bridge between them is the model file.
 
 pub mod error;
@@ -18,6 +18,8 @@ pub mod panorama;
 pub mod shade;
 pub mod sphere;
 
+#[cfg(feature = "learn")]
+pub mod baseline;
 #[cfg(feature = "learn")]
 pub mod data;
 #[cfg(feature = "learn")]

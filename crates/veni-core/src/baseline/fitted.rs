@@ -1,0 +1,61 @@
+//! What a fit gives.
+
+use super::Space;
+use super::gaussians::Gaussians;
+use super::harmonics::Harmonics;
+
+/// Where an expansion of radiance itself falls below this share of its own mean over the sphere, it is held there: such
+/// expansions ring below zero, which has no logarithm. A thousandth of the mean is black on any display.
+pub const FLOOR: f64 = 1e-3;
+
+/// The expansion itself.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Field {
+    /// Spherical harmonics.
+    Harmonics(Harmonics),
+    /// Spherical Gaussians.
+    Gaussians(Gaussians),
+}
+
+/// A baseline fitted to one image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fitted {
+    /// What the field is an expansion of.
+    pub space: Space,
+    /// The field.
+    pub field: Field,
+}
+
+impl Fitted {
+    /// Natural-log radiance at (unit) directions of the native frame. An expansion of radiance is held above
+    /// [`FLOOR`] times its mean.
+    pub fn log_radiance(&self, directions: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let directions: Vec<_> = directions.iter().map(|d| d.map(f64::from)).collect();
+        let (values, mean) = match &self.field {
+            Field::Harmonics(field) => (field.values(&directions), field.mean()),
+            Field::Gaussians(field) => (field.values(&directions), field.mean()),
+        };
+        let floor = mean.map(|m| (FLOOR * m).max(f64::from(f32::MIN_POSITIVE)));
+        let log = |v: [f64; 3]| match self.space {
+            Space::Log => v.map(|v| v as f32),
+            Space::Linear => [0, 1, 2].map(|c| v[c].max(floor[c]).ln() as f32),
+        };
+        values.into_iter().map(log).collect()
+    }
+
+    /// Every number that the field consists of, [`Baseline::dimension`](super::Baseline::dimension) of them. Harmonics:
+    /// per function red, green, blue. Gaussians: per lobe θ and φ of the axis, ln λ, and the amplitude's red, green,
+    /// blue; then the constant's.
+    pub fn parameters(&self) -> Vec<f64> {
+        match &self.field {
+            Field::Harmonics(field) => field.coefficients().as_flattened().to_vec(),
+            Field::Gaussians(field) => {
+                let lobe = |l: &super::gaussians::Lobe| {
+                    let ([x, y, z], [r, g, b]) = (l.axis, l.amplitude);
+                    [x.hypot(y).atan2(z), y.atan2(x), l.sharpness.ln(), r, g, b]
+                };
+                field.lobes.iter().flat_map(lobe).chain(field.constant).collect()
+            }
+        }
+    }
+}

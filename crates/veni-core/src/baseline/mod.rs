@@ -1,0 +1,40 @@
+//! The systems that VENI is compared with: an image's own expansion in spherical harmonics or spherical Gaussians, given
+//! as many numbers D as a latent has. No prior, no training, no tensors.
+//!
+//! | system | what is expanded | numbers |
+//! |---|---|---|
+//! | [`Kind::SphericalHarmonics`] | log radiance or radiance ([`Space`]) | 3(L+1)² |
+//! | [`Kind::SphericalGaussians`] | the same, in lobes of either sign | 6 per lobe + 3 |
+//! | [`Kind::GaussianMixture`] | radiance, in positive lobes; error in log radiance | 6 per lobe + 3 |
+//!
+//! All are fitted to the whole sphere with every pixel weighted by its solid angle, in the native frame. The authors'
+//! own forms, which golden files test, are in [`harmonics::reference`] and [`gaussians::reference`].
+//!
+//! ```
+//! # use veni_core::{Result, baseline::{Baseline, Kind, Space}, sphere::Equirect};
+//! # fn main() -> Result<()> {
+//! let grid = Equirect::new(32, 16);
+//! let sky: Vec<f32> = grid.directions().iter().flat_map(|d| [d[2], 0.5 * d[0], 1.0]).collect();
+//! let baseline = Baseline::from_dimension(Kind::SphericalHarmonics, 27, Space::Log)?;
+//! let fitted = baseline.fit(grid, &sky)?;
+//! assert_eq!(fitted.parameters().len(), 27);
+//! assert!((fitted.log_radiance(&[[0.0, 0.0, 1.0]])[0][0] - 1.0).abs() < 1e-3);
+//! # Ok(())
+//! # }
+//! ```
+
+mod adam;
+mod fitted;
+pub mod gaussians;
+pub mod harmonics;
+mod least_squares;
+mod system;
+mod target;
+
+pub use adam::Adam;
+pub use fitted::{FLOOR, Field, Fitted};
+pub use system::{Baseline, Kind};
+pub use target::Space;
+
+#[cfg(test)]
+mod tests;
