@@ -8,5 +8,6 @@ mod encode;
 mod gpu;
 mod inspect;
 mod readers;
+mod render_probe;
 mod training;
 mod util;

@@ -46,6 +46,7 @@ pub(crate) enum Command {
     Sample(commands::sample::Sample),
     #[cfg(feature = "learn")]
     Encode(commands::encode::Encode),
+    RenderProbe(commands::render_probe::RenderProbe),
     Inspect(commands::inspect::Inspect),
     Bench(commands::bench::Bench),
     #[cfg(feature = "learn")]

@@ -7,6 +7,7 @@ pub(crate) mod completions;
 pub(crate) mod encode;
 pub(crate) mod inspect;
 pub(crate) mod man;
+pub(crate) mod render_probe;
 pub(crate) mod sample;
 #[cfg(feature = "learn")]
 pub(crate) mod train;
@@ -23,6 +24,7 @@ pub(crate) fn run(command: Command, report: Report) -> Result<Outcome> {
         Command::Sample(c) => c.run(report),
         #[cfg(feature = "learn")]
         Command::Encode(c) => c.run(report),
+        Command::RenderProbe(c) => c.run(report),
         Command::Inspect(c) => c.run(report),
         Command::Bench(c) => c.run(report),
         #[cfg(feature = "learn")]

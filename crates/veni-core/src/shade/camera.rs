@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::vector::{Vector, add, cross, narrow, scale, sub, unit, wide};
+use super::vector::{Vector, add, cross, narrow, scale, sub, unit};
 use crate::{Error, Result};
 
 /// The horizontal field of view of the authors' renderings, radians (REFERENCE §11): 39.6°.
@@ -139,13 +139,9 @@ impl Camera {
     }
 }
 
-/// Rays in double precision, normalised.
-pub(super) fn normalised(ray: [f32; 3]) -> Option<Vector> {
-    unit(wide(ray))
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::vector::wide;
     use super::*;
 
     #[test]
