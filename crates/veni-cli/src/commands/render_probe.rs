@@ -22,8 +22,8 @@ use crate::report::{Outcome, Report};
 use crate::size::Size;
 use shape::Up;
 
-/// Largest image, pixels: normals, rays and image of more would take gigabytes.
-const MAX_PIXELS: usize = 1 << 26;
+/// Largest image, pixels, for which about 150 bytes each are needed.
+const MAX_PIXELS: usize = 1 << 24;
 /// Largest width of the light.
 const MAX_LIGHTS: usize = 4096;
 /// Largest |--exposure|.

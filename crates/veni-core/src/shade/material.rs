@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 
 use super::ShadingForm;
-use super::vector::{Vector, add, dot, narrow, scale, unit};
+use super::vector::{Vector, add, dot, narrow, scale};
 use crate::{Error, Result};
 
 /// What [`ShadingForm::Reference`] never goes below, with Blinn-Phong.
@@ -111,9 +111,13 @@ pub(super) struct Lobes {
     normal: Vector,
     /// The view vector of h.
     view: Vector,
+    /// n · view.
+    facing: f64,
     diffuse: f64,
     specular: f64,
     shininess: f64,
+    /// Where n·h is less, the lobe is below 1e-13 of its peak and taken for 0 (ln x ≤ x − 1); at least 0.
+    cutoff: f64,
 }
 
 impl Lobes {
@@ -127,7 +131,8 @@ impl Lobes {
             }
             ShadingForm::Reference => (ray, 1.0, (s + 2.0) / (4.0 * (2.0 - (-0.5 * s).exp()))),
         };
-        Self { form, normal, view, diffuse, specular, shininess: s }
+        let cutoff = if s > 30.0 { 1.0 - 30.0 / s } else { 0.0 };
+        Self { form, normal, view, facing: dot(normal, view), diffuse, specular, shininess: s, cutoff }
     }
 
     /// Lambert: max(n·l, 0), over π in the physical form.
@@ -145,13 +150,18 @@ impl Lobes {
                 if cosine <= 0.0 {
                     return 0.0;
                 }
-                (cosine, unit(add(light, self.view)).map_or(0.0, |half| dot(self.normal, half)))
+                // most pairs are far down the lobe: told without a root
+                let half = add(light, self.view);
+                let (along, square) = (cosine + self.facing, dot(half, half));
+                if along <= 0.0 || along * along < self.cutoff * self.cutoff * square {
+                    return 0.0;
+                }
+                (cosine, along / square.sqrt())
             }
             // a lobe without a cosine, lit from below the surface too
             ShadingForm::Reference => (1.0, f64::from(self.reference_cosine(light))),
         };
-        // far down the lobe the logarithm is spared: ln x ≤ x − 1
-        if x <= 0.0 || self.shininess * (x - 1.0) < -40.0 {
+        if x <= self.cutoff {
             return 0.0;
         }
         cosine * self.specular * (self.shininess * x.ln()).exp()

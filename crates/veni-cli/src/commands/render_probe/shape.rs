@@ -41,15 +41,16 @@ pub(super) fn mesh(
     report: Report,
 ) -> Result<(Surface, Camera)> {
     let mesh = read(path, up)?;
-    if mesh.normals.is_none() {
-        report.note(format_args!("{}: has no normals; its faces are flat", path.display()));
-    }
     let see = || {
         let ball = mesh.bounding_sphere()?;
         let camera = Camera::framing(ball, angles, REFERENCE_FIELD_OF_VIEW, [width, height], MARGIN)?;
         Ok((mesh.surface(&camera, width, height)?, camera))
     };
-    see().map_err(|e: Error| e.in_file(path).into())
+    let seen = see().map_err(|e: Error| e.in_file(path))?;
+    if mesh.normals.is_none() {
+        report.note(format_args!("{}: has no normals; its faces are flat", path.display()));
+    }
+    Ok(seen)
 }
 
 /// All objects of an OBJ file as one mesh in the native frame, three vertices of its own to each triangle.
