@@ -145,6 +145,10 @@ fn a_mesh_is_read_with_and_without_normals() {
     assert!(!note.contains("no normals"), "{note}");
     let (flat, note) = normals("flat.obj", "z");
     assert!(note.contains("flat.obj") && note.contains("no normals"), "{note}");
+    // normals that no face names are none
+    dir.write("unused.obj", format!("vn 0 0 1\n{}", cube(false)));
+    let (unused, note) = normals("unused.obj", "y");
+    assert!(note.contains("no normals") && unused.difference(&flat) < 1e-5, "{note}");
     // a cube is the same with either axis up: its front and its top are seen
     assert!(smooth.difference(&flat) < 1e-5);
     let count = |n: [f32; 3]| {
@@ -190,7 +194,7 @@ fn bad_input_is_explained() {
         ("point.obj", "v 1 2 3\nf 1 1 1\n".into(), "single point"),
         ("vertex.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n".into(), "vertex"),
         ("normal.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//7\n".into(), "normal"),
-        ("half.obj", format!("{}f 1 2 3\n", cube(true)), "all of them"),
+        ("half.obj", format!("{}f 1 2 3\n", cube(true)), "3 of 27 corners of faces lack normals"),
         ("number.obj", "v 0 zero 0\n".into(), "three numbers"),
         ("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".into(), "NaN"),
     ] {

@@ -285,7 +285,7 @@ fn albedo(text: &str) -> Result<[f32; 3], String> {
 
 fn lights(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {
-        Ok(n) if n >= 2 && n <= MAX_LIGHTS && n % 2 == 0 => Ok(n),
+        Ok(n) if (2..=MAX_LIGHTS).contains(&n) && n % 2 == 0 => Ok(n),
         _ => Err(format!("give an even width from 2 to {MAX_LIGHTS}; the height is half of it")),
     }
 }

@@ -120,8 +120,8 @@ impl Camera {
         for a in 0..3 {
             for b in 0..3 {
                 let expected = if a == b { 1.0 } else { 0.0 };
-                // NaN is not close to anything
-                if !((product(a, b) - expected).abs() < 1e-6) {
+                let off = (product(a, b) - expected).abs();
+                if off.is_nan() || off > 1e-6 {
                     return Err(Error::invalid(format!("the camera's axes {axes:?} are not orthonormal")));
                 }
             }

@@ -1,7 +1,5 @@
 //! What is lit: a sphere, or the triangles of an OBJ file, framed by the camera.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 use anyhow::{Result, anyhow, bail};
@@ -55,7 +53,17 @@ pub(super) fn mesh(
 
 /// All objects of an OBJ file as one mesh in the native frame, three vertices of its own to each triangle.
 fn read(path: &Path, up: Up) -> Result<Mesh> {
-    let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| anyhow!("{}: is not text: a Wavefront OBJ file is", path.display()))?;
+    let [with, without] = corners(&text);
+    if with > 0 && without > 0 {
+        bail!(
+            "{}: {without} of {} corners of faces lack normals: give all of them one, or none",
+            path.display(),
+            with + without
+        );
+    }
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -64,36 +72,35 @@ fn read(path: &Path, up: Up) -> Result<Mesh> {
     };
     // materials are not used: a missing library is no reason to fail
     let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut BufReader::new(file), &options, no_materials)
+    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials)
         .map_err(|e| anyhow!("{}: {}", path.display(), explain(e)))?;
     let native = |v: &[f32]| match up {
         Up::Y => Frame::Gltf.to_native([v[0], v[1], v[2]]),
         Up::Z => [v[0], v[1], v[2]],
     };
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
-    for model in &models {
-        let (mesh, name) = (&model.mesh, &model.name);
-        let corners = mesh.indices.len();
-        if ![0, corners].contains(&mesh.normal_indices.len()) {
-            bail!(
-                "{}: object '{name}' has normals on {} of {corners} corners: give all of them one, or none",
-                path.display(),
-                mesh.normal_indices.len()
-            );
-        }
+    for tobj::Model { mesh, .. } in &models {
         positions.extend(mesh.indices.iter().map(|at| native(&mesh.positions[3 * *at as usize..])));
-        if mesh.normal_indices.is_empty() {
-            // 0 stands for the triangle's own
-            normals.resize(positions.len(), [0.0; 3]);
-        } else {
+        if with > 0 {
             normals.extend(mesh.normal_indices.iter().map(|at| native(&mesh.normals[3 * *at as usize..])));
         }
     }
     let count = u32::try_from(positions.len())
         .map_err(|_| anyhow!("{}: more than {} corners of triangles", path.display(), u32::MAX))?;
     let triangles = (0..count / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    let smooth = normals.iter().any(|n| *n != [0.0; 3]);
-    Ok(Mesh { positions, normals: smooth.then_some(normals), triangles })
+    Ok(Mesh { positions, normals: (with > 0).then_some(normals), triangles })
+}
+
+/// How many corners of faces name a normal, and how many do not. The reader would make one up for those.
+fn corners(text: &str) -> [usize; 2] {
+    let mut counts = [0; 2];
+    let words = text.lines().map(|line| line.split('#').next().unwrap_or_default().split_whitespace());
+    let faces = words.filter_map(|mut words| (words.next() == Some("f")).then_some(words));
+    for corner in faces.flatten() {
+        let named = corner.split('/').nth(2).is_some_and(|n| !n.is_empty());
+        counts[usize::from(!named)] += 1;
+    }
+    counts
 }
 
 /// What is wrong with the file.
@@ -106,7 +113,6 @@ fn explain(error: tobj::LoadError) -> String {
         E::PositionParseError => "a vertex is not three numbers",
         E::NormalParseError => "a normal is not three numbers",
         E::FaceParseError | E::InvalidPolygon => "a face is not a list of at least three vertices",
-        E::ReadError => "is not text: a Wavefront OBJ file is",
         other => return format!("no readable Wavefront OBJ file: {other}"),
     };
     what.to_owned()
