@@ -9,5 +9,6 @@ mod fit;
 mod gpu;
 mod inspect;
 mod readers;
+mod render_probe;
 mod training;
 mod util;

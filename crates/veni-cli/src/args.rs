@@ -48,6 +48,7 @@ pub(crate) enum Command {
     Encode(commands::encode::Encode),
     #[cfg(feature = "learn")]
     Fit(commands::fit::Fit),
+    RenderProbe(commands::render_probe::RenderProbe),
     Inspect(commands::inspect::Inspect),
     Bench(commands::bench::Bench),
     #[cfg(feature = "learn")]

@@ -19,6 +19,11 @@ pub(crate) const FRAME: &str = "veni:frame";
 /// Attribute of a cube map: its faces from top to bottom.
 pub(crate) const CUBE_FACES: &str = "veni:cubeFaces";
 
+/// Attribute of a shaded image and of its normals: the camera (`veni_core::shade::Camera`).
+pub(crate) const CAMERA: &str = "veni:camera";
+/// Attribute of a shaded image: what the surface is made of.
+pub(crate) const MATERIAL: &str = "veni:material";
+
 /// Refuses, before any work, what could not be written after it: a file that exists, a name without one of
 /// `extensions`, a folder that is missing or cannot be written to, a name given twice.
 pub(crate) fn check(paths: &[PathBuf], extensions: &[&str], overwrite: Overwrite) -> Result<()> {

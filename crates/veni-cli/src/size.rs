@@ -51,6 +51,11 @@ impl Size {
         Ok((self.width, height))
     }
 
+    /// (width, height) of any image: square if only a width was given.
+    pub(crate) fn image(self) -> (usize, usize) {
+        (self.width, self.height.unwrap_or(self.width))
+    }
+
     /// The edge of one cube face.
     pub(crate) fn cube(self) -> Result<usize> {
         match self.height {
@@ -83,6 +88,8 @@ mod tests {
         {
             assert_eq!(text.parse::<Size>().unwrap().equirect().unwrap(), equirect, "{text}");
         }
+        assert_eq!("256".parse::<Size>().unwrap().image(), (256, 256));
+        assert_eq!("256x16".parse::<Size>().unwrap().image(), (256, 16));
         assert_eq!("256".parse::<Size>().unwrap().cube().unwrap(), 256);
         assert_eq!("256x256".parse::<Size>().unwrap().cube().unwrap(), 256);
     }

@@ -122,6 +122,11 @@ enum Content {
     Image,
 }
 
+/// Whether a file is a latent, and not an image.
+pub(crate) fn is_latent(path: &Path) -> Result<bool> {
+    Ok(matches!(content(path)?, Content::Latent))
+}
+
 /// JSON is a latent; everything else is left to the image readers, which say what they do not read.
 fn content(path: &Path) -> Result<Content> {
     let mut start = Vec::new();

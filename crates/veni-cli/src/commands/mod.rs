@@ -9,6 +9,7 @@ pub(crate) mod encode;
 pub(crate) mod fit;
 pub(crate) mod inspect;
 pub(crate) mod man;
+pub(crate) mod render_probe;
 pub(crate) mod sample;
 #[cfg(feature = "learn")]
 pub(crate) mod train;
@@ -27,6 +28,7 @@ pub(crate) fn run(command: Command, report: Report) -> Result<Outcome> {
         Command::Encode(c) => c.run(report),
         #[cfg(feature = "learn")]
         Command::Fit(c) => c.run(report),
+        Command::RenderProbe(c) => c.run(report),
         Command::Inspect(c) => c.run(report),
         Command::Bench(c) => c.run(report),
         #[cfg(feature = "learn")]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::vector::{Vector, add, cross, narrow, scale, sub, unit, wide};
+use super::vector::{Vector, add, cross, narrow, scale, sub, unit};
 use crate::{Error, Result};
 
 /// The horizontal field of view of the authors' renderings, radians (REFERENCE §11): 39.6°.
@@ -120,8 +120,8 @@ impl Camera {
         for a in 0..3 {
             for b in 0..3 {
                 let expected = if a == b { 1.0 } else { 0.0 };
-                // NaN is not close to anything
-                if !((product(a, b) - expected).abs() < 1e-6) {
+                let off = (product(a, b) - expected).abs();
+                if off.is_nan() || off > 1e-6 {
                     return Err(Error::invalid(format!("the camera's axes {axes:?} are not orthonormal")));
                 }
             }
@@ -139,13 +139,9 @@ impl Camera {
     }
 }
 
-/// Rays in double precision, normalised.
-pub(super) fn normalised(ray: [f32; 3]) -> Option<Vector> {
-    unit(wide(ray))
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::vector::wide;
     use super::*;
 
     #[test]

@@ -36,17 +36,17 @@ impl WithSimd for Dot<'_> {
         let (a, b) = (S::as_simd_f32s(a).0, S::as_simd_f32s(b).0);
         let (c, d) = (S::as_simd_f32s(c).0, S::as_simd_f32s(d).0);
         let x = [S::as_simd_f32s(&self.x[0]).0, S::as_simd_f32s(&self.x[1]).0, S::as_simd_f32s(&self.x[2]).0];
-        let mut sums = [[simd.splat_f32s(0.0); 3]; ROWS];
+        let zero = simd.splat_f32s(0.0);
+        let (mut sa, mut sb, mut sc, mut sd) = ([zero; 3], [zero; 3], [zero; 3], [zero; 3]);
         let rows = a.iter().zip(b).zip(c).zip(d);
         for ((((a, b), c), d), ((x0, x1), x2)) in rows.zip(x[0].iter().zip(x[1]).zip(x[2])) {
-            for (sums, row) in sums.iter_mut().zip([a, b, c, d]) {
-                sums[0] = simd.mul_add_f32s(*row, *x0, sums[0]);
-                sums[1] = simd.mul_add_f32s(*row, *x1, sums[1]);
-                sums[2] = simd.mul_add_f32s(*row, *x2, sums[2]);
-            }
+            sa = multiply_add(simd, *a, [*x0, *x1, *x2], sa);
+            sb = multiply_add(simd, *b, [*x0, *x1, *x2], sb);
+            sc = multiply_add(simd, *c, [*x0, *x1, *x2], sc);
+            sd = multiply_add(simd, *d, [*x0, *x1, *x2], sd);
         }
         let mut out = [[0.0; 3]; ROWS];
-        for (out, sums) in out.iter_mut().zip(sums) {
+        for (out, sums) in out.iter_mut().zip([sa, sb, sc, sd]) {
             for (out, sum) in out.iter_mut().zip(sums) {
                 *out = simd.reduce_sum_f32s(sum);
             }
@@ -72,21 +72,32 @@ impl WithSimd for Add<'_> {
         let [y0, y1, y2] = self.y;
         let (y0, y1) = (S::as_mut_simd_f32s(y0).0, S::as_mut_simd_f32s(y1).0);
         let y2 = S::as_mut_simd_f32s(y2).0;
-        let mut factor = [[simd.splat_f32s(0.0); 3]; ROWS];
-        for (lanes, values) in factor.iter_mut().zip(self.factor) {
-            for (lanes, value) in lanes.iter_mut().zip(values) {
-                *lanes = simd.splat_f32s(*value);
-            }
-        }
+        let [fa, fb, fc, fd] = *self.factor;
+        let (fa, fb) = (splat(simd, fa), splat(simd, fb));
+        let (fc, fd) = (splat(simd, fc), splat(simd, fd));
         let rows = a.iter().zip(b).zip(c).zip(d);
         for ((((a, b), c), d), ((y0, y1), y2)) in rows.zip(y0.iter_mut().zip(y1).zip(y2)) {
-            for (row, factor) in [a, b, c, d].into_iter().zip(&factor) {
-                *y0 = simd.mul_add_f32s(*row, factor[0], *y0);
-                *y1 = simd.mul_add_f32s(*row, factor[1], *y1);
-                *y2 = simd.mul_add_f32s(*row, factor[2], *y2);
-            }
+            let mut y = [*y0, *y1, *y2];
+            y = multiply_add(simd, *a, fa, y);
+            y = multiply_add(simd, *b, fb, y);
+            y = multiply_add(simd, *c, fc, y);
+            y = multiply_add(simd, *d, fd, y);
+            [*y0, *y1, *y2] = y;
         }
     }
+}
+
+// Written out, and without closures: what is compiled outside the caller's SIMD features is not inlined into them.
+
+/// w x + y for three channels.
+#[inline(always)]
+fn multiply_add<S: Simd>(simd: S, w: S::f32s, x: [S::f32s; 3], y: [S::f32s; 3]) -> [S::f32s; 3] {
+    [simd.mul_add_f32s(w, x[0], y[0]), simd.mul_add_f32s(w, x[1], y[1]), simd.mul_add_f32s(w, x[2], y[2])]
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, x: [f32; 3]) -> [S::f32s; 3] {
+    [simd.splat_f32s(x[0]), simd.splat_f32s(x[1]), simd.splat_f32s(x[2])]
 }
 
 #[cfg(test)]

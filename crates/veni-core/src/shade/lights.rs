@@ -1,7 +1,7 @@
 //! Sets of distant lights.
 
 use super::icosahedron;
-use super::vector::{narrow, unit, wide};
+use super::vector::unit_f32;
 use crate::sphere::{Equirect, reference};
 use crate::{Error, Result};
 
@@ -27,8 +27,8 @@ impl Lights {
             )));
         }
         let normalised = directions.iter().enumerate().map(|(at, d)| {
-            let unit = unit(wide(*d)).map(narrow);
-            unit.ok_or_else(|| Error::invalid(format!("light {at} has direction {d:?}: it points nowhere")))
+            unit_f32(*d)
+                .ok_or_else(|| Error::invalid(format!("light {at} has direction {d:?}: it points nowhere")))
         });
         let directions = normalised.collect::<Result<_>>()?;
         if let Some(wrong) = solid_angles.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {

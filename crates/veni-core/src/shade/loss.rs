@@ -2,6 +2,7 @@
 
 use super::Transfer;
 use super::transfer::check_image;
+use super::vector::dot;
 use crate::panorama::tonemap::{REFERENCE_QUANTILE, quantile, srgb};
 use crate::{Error, Result};
 
@@ -20,8 +21,8 @@ pub enum ShadedLoss {
     /// The authors' figure (REFERENCE §11): 100 mean |ln R − ln T| over all pixels, where those that show nothing are
     /// equal.
     ReferenceLog,
-    /// RENI++'s demonstration: `mse` mean (g(R) − g(T))² + `cosine` (1 − mean cos(R, T)) over all pixels, with g(x) the sRGB
-    /// curve of x/q, not clamped, and q the 98 % quantile of T, in which pixels that show nothing are 1. The
+    /// RENI++'s demonstration: `mse` mean (g(R) − g(T))² + `cosine` (1 − mean cos(g(R), g(T))) over all pixels, with g(x) the
+    /// sRGB curve of x/q, not clamped, and q the 98 % quantile of T, in which pixels that show nothing are 1. The
     /// demonstration weighs them 100 and 1, and adds 0.001 mean z² over the latent's coordinates, which is the
     /// caller's.
     ReferenceDisplay {
@@ -146,7 +147,7 @@ impl Comparison {
         (total, slopes.map(|v| v as f32))
     }
 
-    /// Mean (g(R) − g(T))² and 1 − mean cos(R, T) of [`ShadedLoss::ReferenceDisplay`].
+    /// Mean (g(R) − g(T))² and 1 − mean cos(g(R), g(T)) of [`ShadedLoss::ReferenceDisplay`].
     pub(super) fn display_terms(&self, image: &[[f32; 3]]) -> Option<[f64; 2]> {
         matches!(self.loss, ShadedLoss::ReferenceDisplay { .. }).then(|| {
             let pairs = image.iter().zip(&self.target).filter(|(_, t)| !t[0].is_nan());
@@ -160,25 +161,23 @@ impl Comparison {
 
 /// The two parts of the display loss of one pixel, and their gradients.
 fn display(r: [f64; 3], t: [f64; 3], white: f64) -> ([f64; 2], [[f64; 3]; 2]) {
-    let mut parts = [0.0; 2];
-    let squares = [0, 1, 2].map(|c| {
-        let x = (r[c] / white) as f32;
-        let difference = f64::from(srgb(x)) - f64::from(srgb((t[c] / white) as f32));
-        let slope = if x <= 0.003_130_8 { 12.92 } else { 1.055 / 2.4 * f64::from(x).powf(1.0 / 2.4 - 1.0) };
-        // a mean over channels too
-        parts[0] += difference * difference / 3.0;
-        2.0 * difference * slope / (3.0 * white)
+    let shown = |v: [f64; 3]| v.map(|v| f64::from(srgb((v / white) as f32)));
+    let (a, b) = (shown(r), shown(t));
+    let slope = r.map(|v| {
+        let x = v / white;
+        if x <= 0.003_130_8 { 12.92 / white } else { 1.055 / 2.4 * x.powf(1.0 / 2.4 - 1.0) / white }
     });
-    let product = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let (rr, tt, rt) = (product(r, r), product(t, t), product(r, t));
-    let norms = (rr * tt).sqrt();
+    let difference = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    let square = dot(difference, difference) / 3.0;
+    let squares = [0, 1, 2].map(|c| 2.0 / 3.0 * difference[c] * slope[c]);
+    let (aa, bb, ab) = (dot(a, a), dot(b, b), dot(a, b));
+    let norms = (aa * bb).sqrt();
     // PyTorch's cosine similarity: the product of norms is at least 1e-8
     let (cosine, angle) = if norms > 1e-8 {
-        let cosine = rt / norms;
-        (cosine, [0, 1, 2].map(|c| -(t[c] / norms - cosine * r[c] / rr)))
+        let cosine = ab / norms;
+        (cosine, [0, 1, 2].map(|c| (cosine * a[c] / aa - b[c] / norms) * slope[c]))
     } else {
-        (rt / 1e-8, t.map(|v| -v / 1e-8))
+        (ab / 1e-8, [0, 1, 2].map(|c| -b[c] / 1e-8 * slope[c]))
     };
-    parts[1] = 1.0 - cosine;
-    (parts, [squares, angle])
+    ([square, 1.0 - cosine], [squares, angle])
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::vector::{narrow, unit, wide};
+use super::vector::{length, narrow, unit_f32, wide};
 use crate::panorama::tonemap::srgb_to_linear;
 use crate::panorama::{Panorama, ReadOptions};
 use crate::{Error, Result};
@@ -62,9 +62,8 @@ impl NormalMap {
 
     /// The unit vector if the length is between 0.5 and 1.5, else `None`.
     pub fn valid(normal: [f32; 3]) -> Option<[f32; 3]> {
-        let normal = wide(normal);
-        let length = super::vector::length(normal);
-        (length > LENGTHS[0] && length < LENGTHS[1]).then(|| unit(normal).map(narrow)).flatten()
+        let length = length(wide(normal));
+        (length > LENGTHS[0] && length < LENGTHS[1]).then(|| unit_f32(normal)).flatten()
     }
 
     /// Each vector (x, y, z) becomes (x, −y, z): from maps whose green channel grows downwards (as the authors' program

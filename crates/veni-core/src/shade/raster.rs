@@ -11,7 +11,8 @@ use crate::{Error, Result};
 pub struct Mesh {
     /// Vertex positions.
     pub positions: Vec<[f32; 3]>,
-    /// Vertex normals (any length but 0), one per position; without them every triangle is flat.
+    /// Vertex normals of any length, one per position; one of length 0 stands for the triangle's own. Without them every
+    /// triangle is flat.
     pub normals: Option<Vec<[f32; 3]>>,
     /// Three positions each.
     pub triangles: Vec<[u32; 3]>,

@@ -1,7 +1,6 @@
 //! What a camera sees of a shape: a normal and a ray for every pixel.
 
-use super::camera::normalised;
-use super::vector::{add, dot, narrow, scale, sub, unit, wide};
+use super::vector::{add, dot, narrow, scale, sub, unit, unit_f32, wide};
 use super::{Camera, NormalMap};
 use crate::{Error, Result};
 
@@ -52,10 +51,10 @@ impl Surface {
             let Some(normal) = NormalMap::valid(normals[k]).filter(|_| mask.is_none_or(|m| m[k])) else {
                 continue;
             };
-            let ray = normalised(rays[k]).ok_or_else(|| {
+            let ray = unit_f32(rays[k]).ok_or_else(|| {
                 Error::invalid(format!("pixel ({}, {}) has ray {:?}", k % width, k / width, rays[k]))
             })?;
-            (surface.normals[k], surface.rays[k], surface.valid[k]) = (normal, narrow(ray), true);
+            (surface.normals[k], surface.rays[k], surface.valid[k]) = (normal, ray, true);
         }
         if surface.pixels() == 0 {
             return Err(Error::invalid(format!(

@@ -1,6 +1,7 @@
 //! The linear map from the light to the image, row by row.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use pulp::Arch;
 use rayon::prelude::*;
@@ -20,7 +21,8 @@ const PARTS: usize = 32;
 /// Light to image: everything of a shaded image but the light.
 ///
 /// Pixels of equal normal (and, with a specular lobe, equal ray) share a row. The matrix is kept if it fits into the
-/// memory allowed; else its rows are computed each time they are needed, which costs time and no memory.
+/// memory allowed; else its rows are computed each time they are needed, which costs time and no memory. Clones share
+/// it.
 #[derive(Clone, Debug)]
 pub struct Transfer {
     size: [usize; 2],
@@ -33,7 +35,7 @@ pub struct Transfer {
     groups: Vec<Group>,
     pixels: Vec<Pixel>,
     /// Row-major, groups × rows of a group × padded lights.
-    stored: Option<Vec<f32>>,
+    stored: Option<Arc<Vec<f32>>>,
 }
 
 /// What the rows of a group hold.
@@ -108,7 +110,7 @@ impl Transfer {
             rows.par_chunks_exact_mut(row)
                 .zip(&transfer.groups)
                 .for_each(|(out, group)| transfer.fill(group, out));
-            transfer.stored = Some(rows);
+            transfer.stored = Some(Arc::new(rows));
         }
         Ok(transfer)
     }
@@ -338,24 +340,33 @@ impl LobeRows {
 /// Visible pixels sorted into groups of equal rows, in the order of their first pixels.
 fn group(surface: &Surface, material: &Material) -> (Vec<Group>, Vec<Pixel>) {
     let shiny = material.specular.is_some();
+    let visible: Vec<usize> = (0..surface.valid().len()).filter(|at| surface.valid()[*at]).collect();
     let mut known: HashMap<[u32; 6], usize> = HashMap::new();
-    let mut members: Vec<Vec<usize>> = Vec::new();
-    for at in (0..surface.valid().len()).filter(|at| surface.valid()[*at]) {
-        let (normal, ray) = (surface.normals()[at], surface.rays()[at]);
-        let ray = if shiny { ray } else { [0.0; 3] };
-        let key = [normal[0], normal[1], normal[2], ray[0], ray[1], ray[2]].map(f32::to_bits);
-        let group = *known.entry(key).or_insert(members.len());
-        if group == members.len() {
-            members.push(Vec::new());
+    let mut groups: Vec<Group> = Vec::new();
+    let mut group_of = Vec::with_capacity(visible.len());
+    for at in &visible {
+        let (normal, ray) = (surface.normals()[*at], surface.rays()[*at]);
+        let seen = if shiny { ray } else { [0.0; 3] };
+        let key = [normal[0], normal[1], normal[2], seen[0], seen[1], seen[2]].map(f32::to_bits);
+        let group = *known.entry(key).or_insert(groups.len());
+        if group == groups.len() {
+            groups.push(Group { normal, ray, pixels: 0..0 });
         }
-        members[group].push(at);
+        // the number of members, until their places are known
+        groups[group].pixels.end += 1;
+        group_of.push(group);
     }
-    let (mut groups, mut pixels) = (Vec::with_capacity(members.len()), Vec::new());
-    for members in members {
-        let start = pixels.len();
-        let (normal, ray) = (surface.normals()[members[0]], surface.rays()[members[0]]);
-        pixels.extend(members.into_iter().map(|at| Pixel { at, diffuse: material.diffuse.at(at) }));
-        groups.push(Group { normal, ray, pixels: start..pixels.len() });
+    let mut start = 0;
+    for group in &mut groups {
+        let count = group.pixels.end;
+        group.pixels = start..start;
+        start += count;
+    }
+    let mut pixels = vec![Pixel { at: 0, diffuse: [0.0; 3] }; visible.len()];
+    for (at, group) in visible.into_iter().zip(group_of) {
+        let place = &mut groups[group].pixels.end;
+        pixels[*place] = Pixel { at, diffuse: material.diffuse.at(at) };
+        *place += 1;
     }
     (groups, pixels)
 }

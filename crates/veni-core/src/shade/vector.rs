@@ -38,6 +38,16 @@ pub(super) fn length(a: Vector) -> f64 {
     dot(a, a).sqrt()
 }
 
+/// The unit vector of a vector in single precision; one that is a unit vector already, to within rounding, stays as it
+/// is to the bit. `None` where there is none.
+pub(super) fn unit_f32(a: [f32; 3]) -> Option<[f32; 3]> {
+    let wide = wide(a);
+    if (dot(wide, wide) - 1.0).abs() < 1e-6 {
+        return Some(a);
+    }
+    unit(wide).map(narrow)
+}
+
 /// The unit vector, or `None` where there is none.
 pub(super) fn unit(a: Vector) -> Option<Vector> {
     let length = length(a);

@@ -1,0 +1,308 @@
+//! `veni-cli render-probe`: a sphere or a mesh under the light of a panorama or a latent.
+
+mod light;
+mod shape;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Result, bail};
+use clap::{ArgGroup, Args};
+use serde_json::json;
+use veni_core::output::Overwrite;
+use veni_core::panorama::tonemap::{Curve, REFERENCE_QUANTILE, Tonemap, quantile};
+use veni_core::panorama::{Panorama, Precision, WriteFormat, WriteOptions};
+use veni_core::shade::{Camera, Colour, Lights, Material, ShadingForm, Surface, Transfer};
+use veni_core::sphere::Equirect;
+
+use crate::args::{Force, ModelArgs};
+use crate::output::{self, CAMERA, MATERIAL, with_remedy};
+use crate::report::{Outcome, Report};
+use crate::size::Size;
+use shape::Up;
+
+/// Largest image, pixels, for which about 150 bytes each are needed.
+const MAX_PIXELS: usize = 1 << 24;
+/// Largest width of the light.
+const MAX_LIGHTS: usize = 4096;
+/// Largest |--exposure|.
+const MAX_STOPS: f64 = 64.0;
+/// A mask: 0 and 1, as they are.
+const PLAIN: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
+
+/// Render a sphere or a mesh lit by a panorama or a latent
+#[derive(Args, Debug)]
+#[command(
+    group = ArgGroup::new("light").required(true),
+    long_about = "Render a sphere or a mesh lit by a panorama or a latent.\n\n\
+        The light is an HDR panorama (as it is, not through the encoder), a latent file, or a random sky named by \
+        --seed. The surface is Lambertian, or Blinn-Phong with --ks. Radiance is physically right: the sum over the \
+        light's pixels of reflectance x radiance x cosine x solid angle. Every pixel sees the whole sky: there are no \
+        shadows and no interreflections, as in the article.\n\n\
+        With --normals and --mask this makes the inputs from which 'veni-cli fit' recovers the light.",
+    after_help = "World: z up; the middle of a panorama lies at +x, its right at -y. The camera looks along --azimuth, which \
+        turns from +x to +y, and is raised by --elevation; it frames the sphere or mesh whole. Normals are unit vectors \
+        of this world, x y z in R G B, 0 where there is no surface; the attribute veni:camera of both EXR files holds \
+        the camera (position, axes, horizontal field of view in radians), veni:material what the surface is made of.\n\n\
+        Meshes: triangles and polygons of a Wavefront OBJ file; smooth where it gives normals, else flat. Both sides are \
+        lit. OBJ files have y up as a rule; say --up z otherwise.\n\n\
+        Examples:\n  \
+        veni-cli render-probe sky.exr -o ball.exr -o ball.png          a white sphere\n  \
+        veni-cli render-probe --seed 7 -o ball.png --ks 0.5 --shininess 100\n  \
+        veni-cli render-probe sky.hdr -o bunny.exr --mesh bunny.obj --azimuth 30 --elevation 20\n  \
+        veni-cli render-probe sky.exr -o ball.exr --size 64 --normals n.exr --mask m.png"
+)]
+pub(crate) struct RenderProbe {
+    /// HDR panorama, or latent file
+    #[arg(group = "light", value_name = "PANORAMA|LATENT")]
+    source: Option<PathBuf>,
+
+    /// A random sky from the model's prior, named by a number
+    #[arg(long, short, value_name = "S", group = "light")]
+    seed: Option<u64>,
+
+    /// Image to write (.exr in single precision, .hdr or .png); may be given several times
+    #[arg(long, short, required = true, value_name = "OUT")]
+    output: Vec<PathBuf>,
+
+    /// Also write the normals
+    #[arg(long, value_name = "OUT.exr")]
+    normals: Option<PathBuf>,
+
+    /// Also write a mask, white where there is a surface
+    #[arg(long, value_name = "OUT.png")]
+    mask: Option<PathBuf>,
+
+    /// Width (of a square), or width x height
+    #[arg(long, value_name = "W|WxH", default_value = "256")]
+    size: Size,
+
+    /// Wavefront OBJ file to render instead of a sphere
+    #[arg(long, value_name = "FILE.obj")]
+    mesh: Option<PathBuf>,
+
+    /// Axis of the OBJ file that points up
+    #[arg(long, value_enum, default_value_t, requires = "mesh")]
+    up: Up,
+
+    /// Albedo, one number or three, 0 to 1
+    #[arg(long, value_name = "R[,G,B]", default_value = "1", value_parser = albedo)]
+    albedo: [f32; 3],
+
+    /// Specular fraction K_s, 0 to 1; the diffuse rest is (1 - K_s) x albedo
+    #[arg(long, value_name = "KS", default_value = "0", value_parser = fraction)]
+    ks: f32,
+
+    /// Exponent of the highlight
+    #[arg(long, value_name = "S", default_value = "500", value_parser = shininess)]
+    shininess: f32,
+
+    /// Turn the light about the vertical axis, counter-clockwise seen from above
+    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = finite, allow_hyphen_values = true,
+        hide_default_value = true)]
+    turn: f64,
+
+    /// Make the light brighter (or, negative, darker) by factors of two
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = stops, allow_hyphen_values = true,
+        hide_default_value = true)]
+    exposure: f64,
+
+    /// Azimuth along which the camera looks
+    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = finite, allow_hyphen_values = true,
+        hide_default_value = true)]
+    azimuth: f64,
+
+    /// How far above the horizon the camera stands, -90 to 90
+    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = elevation, allow_hyphen_values = true,
+        hide_default_value = true)]
+    elevation: f64,
+
+    /// Width of the panorama of lights, to which the light is averaged
+    #[arg(long, value_name = "W", default_value = "128", value_parser = lights)]
+    lights: usize,
+
+    #[command(flatten)]
+    model: ModelArgs,
+
+    #[command(flatten)]
+    force: Force,
+}
+
+impl RenderProbe {
+    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        let overwrite = Overwrite::from(self.force);
+        let [width, height] = self.check(overwrite)?;
+        let started = Instant::now();
+        let angles = [self.azimuth.to_radians(), self.elevation.to_radians()];
+        let (surface, camera) = match &self.mesh {
+            Some(path) => shape::mesh(path, self.up, angles, [width, height], report)?,
+            None => shape::sphere(angles, [width, height])?,
+        };
+        let grid = Equirect::new(self.lights, self.lights / 2);
+        let light = match (&self.source, self.seed) {
+            (Some(path), _) => light::from_file(path, &self.model, grid, self.turn.to_radians(), report)?,
+            (None, Some(seed)) => light::seeded(seed, &self.model, grid, self.turn.to_radians())?,
+            (None, None) => bail!("name a panorama or a latent, or give --seed"),
+        };
+        let factor = self.exposure.exp2() as f32;
+        let radiance: Vec<_> = light.iter().map(|p| p.map(|v| v * factor)).collect();
+        let transfer = self.transfer(&surface, grid)?;
+        let image = transfer.render(&radiance);
+        let files = self.write(&surface, &camera, image, factor, overwrite)?;
+        let seconds = started.elapsed().as_secs_f64();
+        let (pixels, lights) = (surface.pixels(), grid.len());
+        let human = format!(
+            "{}: {width} x {height}, {pixels} pixels of surface under {lights} lights ({seconds:.2} s)",
+            files.join(", ")
+        );
+        let value = json!({
+            "files": files,
+            "width": width,
+            "height": height,
+            "pixels": pixels,
+            "lights": [grid.width, grid.height],
+            "camera": serde_json::from_str::<serde_json::Value>(&camera.to_json())?,
+            "material": self.material_json(),
+            "seconds": seconds,
+        });
+        report.result(human, &value)?;
+        Ok(Outcome::Fine)
+    }
+
+    /// All that can be refused before any work; the size of the image.
+    fn check(&self, overwrite: Overwrite) -> Result<[usize; 2]> {
+        output::check(&self.output, &["exr", "hdr", "png"], overwrite)?;
+        output::check(self.normals.as_slice(), &["exr"], overwrite)?;
+        output::check(self.mask.as_slice(), &["png"], overwrite)?;
+        let all: Vec<_> = self.output.iter().chain(&self.normals).chain(&self.mask).cloned().collect();
+        output::check_distinct(&all)?;
+        let (width, height) = self.size.image();
+        if width * height > MAX_PIXELS {
+            bail!("--size {}: more than {MAX_PIXELS} pixels; give a smaller one", self.size);
+        }
+        Ok([width, height])
+    }
+
+    /// The matrix is used once, so it is not kept.
+    fn transfer(&self, surface: &Surface, grid: Equirect) -> Result<Transfer> {
+        let albedo = Colour::Uniform(self.albedo);
+        let material = if self.ks > 0.0 {
+            Material::blinn_phong(albedo, self.ks, self.shininess)
+        } else {
+            Material::lambert(albedo)
+        };
+        Ok(Transfer::with_memory(surface, &material, Lights::equirect(grid), ShadingForm::Physical, 0)?)
+    }
+
+    fn material_json(&self) -> serde_json::Value {
+        json!({ "albedo": self.albedo, "ks": self.ks, "shininess": self.shininess })
+    }
+
+    /// Writes everything; the names of the files.
+    fn write(
+        &self,
+        surface: &Surface,
+        camera: &Camera,
+        image: Vec<[f32; 3]>,
+        factor: f32,
+        overwrite: Overwrite,
+    ) -> Result<Vec<String>> {
+        let size = Equirect::new(surface.width(), surface.height());
+        let camera = (CAMERA.to_owned(), camera.to_json());
+        let material = (MATERIAL.to_owned(), self.material_json().to_string());
+        let write = |path: &Path, pixels: Vec<[f32; 3]>, tonemap, attributes: BTreeMap<_, _>| {
+            let mut format = WriteFormat::of(path, tonemap)?;
+            if let WriteFormat::Exr(precision) = &mut format {
+                *precision = Precision::Float;
+            }
+            let options = WriteOptions { attributes, overwrite, latlong: false, ..WriteOptions::new(format) };
+            Panorama::new(size, pixels).write(path, &options).map_err(with_remedy)
+        };
+        let preview = preview(surface, &image, factor);
+        for path in &self.output {
+            write(path, image.clone(), preview, BTreeMap::from([camera.clone(), material.clone()]))?;
+        }
+        if let Some(path) = &self.normals {
+            write(path, surface.normals().to_vec(), PLAIN, BTreeMap::from([camera]))?;
+        }
+        if let Some(path) = &self.mask {
+            let mask = surface.valid().iter().map(|v| [if *v { 1.0 } else { 0.0 }; 3]).collect();
+            write(path, mask, PLAIN, BTreeMap::new())?;
+        }
+        let files = self.output.iter().chain(&self.normals).chain(&self.mask);
+        Ok(files.map(|p| p.display().to_string()).collect())
+    }
+}
+
+/// The surface's own 98 % quantile becomes white, before --exposure, which would otherwise be undone.
+fn preview(surface: &Surface, image: &[[f32; 3]], factor: f32) -> Tonemap {
+    let seen: Vec<f32> =
+        image.iter().zip(surface.valid()).filter(|(_, valid)| **valid).flat_map(|(p, _)| *p).collect();
+    let white = (quantile(&seen, REFERENCE_QUANTILE) / factor).max(f32::MIN_POSITIVE);
+    Tonemap { scale: 1.0 / white, curve: Curve::Srgb }
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(v) if v.is_finite() => Ok(v),
+        Ok(_) => Err("the number must be finite".to_owned()),
+        Err(_) => Err("not a number".to_owned()),
+    }
+}
+
+fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
+    match finite(text)? {
+        v if (low..=high).contains(&v) => Ok(v),
+        v => Err(format!("{v} is not between {low} and {high}")),
+    }
+}
+
+fn fraction(text: &str) -> Result<f32, String> {
+    Ok(within(text, 0.0, 1.0)? as f32)
+}
+
+fn shininess(text: &str) -> Result<f32, String> {
+    Ok(within(text, 0.0, 1e6)? as f32)
+}
+
+fn stops(text: &str) -> Result<f64, String> {
+    within(text, -MAX_STOPS, MAX_STOPS)
+}
+
+fn elevation(text: &str) -> Result<f64, String> {
+    within(text, -90.0, 90.0)
+}
+
+fn albedo(text: &str) -> Result<[f32; 3], String> {
+    let values = text.split(',').map(fraction).collect::<Result<Vec<_>, _>>()?;
+    match values[..] {
+        [grey] => Ok([grey; 3]),
+        [r, g, b] => Ok([r, g, b]),
+        _ => Err(format!("{} numbers: give one, or three separated by commas", values.len())),
+    }
+}
+
+fn lights(text: &str) -> Result<usize, String> {
+    match text.trim().parse::<usize>() {
+        Ok(n) if (2..=MAX_LIGHTS).contains(&n) && n % 2 == 0 => Ok(n),
+        _ => Err(format!("give an even width from 2 to {MAX_LIGHTS}; the height is half of it")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_read_and_refused() {
+        assert_eq!(albedo("0.5"), Ok([0.5; 3]));
+        assert_eq!(albedo("1, 0.5,0"), Ok([1.0, 0.5, 0.0]));
+        assert!(albedo("1,2,3").unwrap_err().contains("between 0 and 1"));
+        assert!(albedo("1,1").unwrap_err().contains("three"));
+        assert!(albedo("").is_err() && fraction("NaN").is_err() && shininess("-1").is_err());
+        assert_eq!(lights("64"), Ok(64));
+        assert!(lights("7").is_err() && lights("0").is_err() && lights("99999").is_err());
+        assert!(elevation("91").is_err());
+    }
+}

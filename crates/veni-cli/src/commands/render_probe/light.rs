@@ -1,0 +1,53 @@
+//! The light of a probe: a panorama's own pixels, or a decoded latent, on the grid of lights.
+
+use std::path::Path;
+
+use anyhow::{Result, bail};
+use veni_core::latent::Latent;
+use veni_core::panorama::{self, Panorama};
+use veni_core::sphere::Equirect;
+
+use crate::args::ModelArgs;
+use crate::output::CUBE_FACES;
+use crate::report::Report;
+use crate::source::{self, Loaded};
+
+/// Radiance of every light of a file's panorama or latent, turned by `turn` radians.
+pub(super) fn from_file(
+    path: &Path,
+    model: &ModelArgs,
+    grid: Equirect,
+    turn: f64,
+    report: Report,
+) -> Result<Vec<[f32; 3]>> {
+    if source::is_latent(path)? {
+        let loaded = source::model(model)?;
+        let latent = source::from_file(path, &loaded, report)?;
+        return decode(&loaded, &latent, grid, turn);
+    }
+    if panorama::attributes(path)?.contains_key(CUBE_FACES) {
+        bail!("{}: a cube map is no panorama; name an equirectangular image", path.display());
+    }
+    let mut image = Panorama::read(path)?;
+    let bad = image.sanitise().map_err(|e| e.in_file(path))?;
+    if bad.nan + bad.infinite > 0 {
+        report.note(format_args!(
+            "{}: {} values that are not a number and {} infinite ones were replaced",
+            path.display(),
+            bad.nan,
+            bad.infinite
+        ));
+    }
+    Ok(image.resample_turned(grid, turn).into_pixels())
+}
+
+/// The same of a random sky.
+pub(super) fn seeded(seed: u64, model: &ModelArgs, grid: Equirect, turn: f64) -> Result<Vec<[f32; 3]>> {
+    let loaded = source::model(model)?;
+    let latent = source::seeded(&loaded.model, seed);
+    decode(&loaded, &latent, grid, turn)
+}
+
+fn decode(loaded: &Loaded, latent: &Latent, grid: Equirect, turn: f64) -> Result<Vec<[f32; 3]>> {
+    Ok(loaded.model.decoder().condition(&latent.turned(turn))?.bake(grid))
+}
