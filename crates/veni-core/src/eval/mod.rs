@@ -1,4 +1,5 @@
 //! Metrics and evaluation protocols.
 
+pub mod lpips;
 pub mod metrics;
 pub mod reconstruction;
