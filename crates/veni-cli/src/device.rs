@@ -53,14 +53,17 @@ impl Device {
     #[cfg(feature = "gpu")]
     pub(crate) fn open(choice: DecodeDevice, model: &Model, report: Report) -> Result<Self> {
         let gpu = gpu::open(choice, model, report)?;
-        Ok(gpu.map_or_else(|| Self::Cpu(model.decoder()), Self::Gpu))
+        match gpu {
+            Some(gpu) => Ok(Self::Gpu(gpu)),
+            None => Ok(Self::Cpu(model.decoder()?)),
+        }
     }
 
     /// The same in a build that knows the CPU only.
     #[cfg(not(feature = "gpu"))]
     pub(crate) fn open(choice: DecodeDevice, model: &Model, _: Report) -> Result<Self> {
         match choice {
-            DecodeDevice::Auto | DecodeDevice::Cpu => Ok(Self::Cpu(model.decoder())),
+            DecodeDevice::Auto | DecodeDevice::Cpu => Ok(Self::Cpu(model.decoder()?)),
             DecodeDevice::Gpu => anyhow::bail!("--device gpu: {NO_GPU}, or use --device cpu"),
         }
     }

@@ -12,10 +12,10 @@ fn field(c: &mut Criterion) {
     for n in [9, 100] {
         let mut group = c.benchmark_group(format!("D={}", 3 * n));
         let model = Model::filler(&ModelConfig::decode_only(n), 1).unwrap();
-        let decoder = model.decoder();
+        let decoder = model.decoder().unwrap();
         let latent = Latent::from_seed(&Prior::standard(n), 1);
         let field = decoder.condition(&latent).unwrap();
-        group.bench_function("pack", |b| b.iter(|| black_box(&model).decoder()));
+        group.bench_function("pack", |b| b.iter(|| black_box(&model).decoder().unwrap()));
         group.bench_function("condition", |b| b.iter(|| decoder.condition(black_box(&latent)).unwrap()));
         group.bench_function("radiance", |b| b.iter(|| field.radiance(black_box([0.6, 0.0, 0.8]))));
         group.sample_size(10);

@@ -25,7 +25,7 @@ fn main() -> Result<()> {
         return Err(Error::invalid("usage: equivariance MODEL FOLDER"));
     };
     let model = Model::load(Path::new(model))?;
-    let (veni, decoder) = (Veni::from_model(&model, &Device::flex())?, model.decoder());
+    let (veni, decoder) = (Veni::from_model(&model, &Device::flex())?, model.decoder()?);
     let grid = Equirect::new(128, 64);
     let set = Dataset::load(&panorama_files(Path::new(folder))?, grid)?;
     let images: Vec<_> = set.items().iter().map(|item| item.log_radiance.clone()).collect();

@@ -23,7 +23,7 @@ fn main() -> veni_core::Result<()> {
     let mut fields = Vec::new();
     for n in [9, 49, 100] {
         let model = Model::filler(&ModelConfig::decode_only(n), 1)?;
-        fields.push((n, model.decoder().condition(&Latent::from_seed(&Prior::standard(n), 1))?, 0.0f64));
+        fields.push((n, model.decoder()?.condition(&Latent::from_seed(&Prior::standard(n), 1))?, 0.0f64));
     }
     let device = Device::flex();
     let [a, b] = [0, 1].map(|_| Tensor::<2>::random([N, N], Distribution::Default, &device));

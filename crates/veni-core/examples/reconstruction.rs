@@ -86,7 +86,7 @@ fn draw(path: &Path, model: &Model, veni: &Veni, set: &Dataset) -> Result<()> {
     let grid = Equirect::new(256, 128);
     let (w, h) = (grid.width as u32, grid.height as u32);
     let mut sheet = RgbImage::from_pixel(3 * w + 2 * GAP, set.len() as u32 * (h + GAP) - GAP, Rgb([255; 3]));
-    let (decoder, prior) = (model.decoder(), model.prior());
+    let (decoder, prior) = (model.decoder()?, model.prior());
     let images: Vec<_> = set.items().iter().map(|item| item.log_radiance.as_slice()).collect();
     let latents = veni.encode(set.grid(), &images)?.into_iter().map(|e| Latent::new(e.vectors));
     for (r, (item, latent)) in (0..).zip(set.items().iter().zip(latents)) {

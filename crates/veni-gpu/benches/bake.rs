@@ -33,7 +33,8 @@ fn bake(c: &mut Criterion) {
 }
 
 fn on_cpu(c: &mut Criterion, model: &Model, latent: &Latent, n: usize) {
-    let field = model.decoder().condition(latent).expect("a latent of this model");
+    let field =
+        model.decoder().expect("a decoder that folds").condition(latent).expect("a latent of this model");
     let mut group = c.benchmark_group(format!("N = {n} on the CPU"));
     group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(1));
     for [width, height] in &SIZES[..2] {

@@ -111,7 +111,7 @@ fn main() -> Result<()> {
     // compiles now instead of in the first frame
     decoder.prepare(&latents, &bake)?;
 
-    let field = model.decoder().condition(&latent)?;
+    let field = model.decoder()?.condition(&latent)?;
     let mut out = std::io::stdout();
     let (mut worst, mut unturned) = (0f32, Vec::new());
     for step in 0..=3 {

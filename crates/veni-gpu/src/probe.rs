@@ -99,7 +99,7 @@ pub fn largest_error(device: &Device, queue: &Queue) -> Result<f32> {
     let latent = Latent::from_seed(&Prior::standard(9), 1);
     let grid = Equirect::new(32, 16);
     let mut expected = vec![[0.0; 3]; grid.len()];
-    model.decoder().condition(&latent)?.log_radiance_batch(&grid.directions(), &mut expected);
+    model.decoder()?.condition(&latent)?.log_radiance_batch(&grid.directions(), &mut expected);
     let decoder = GpuDecoder::new(device, &model)?;
     let latents = decoder.condition(queue, &latent)?;
     let pixels = guarded(device, "probe", || {

@@ -76,8 +76,11 @@ pub struct FoldedLatent<'a> {
 
 impl Model {
     /// The decoder of this model, packed for evaluation (about a millisecond). Keep it for many latents.
-    pub fn decoder(&self) -> Decoder {
-        Decoder { weights: Arc::new(Weights::new(self)) }
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] if the network is none that folds into a residual perceptron.
+    pub fn decoder(&self) -> Result<Decoder> {
+        Ok(Decoder { weights: Arc::new(Weights::new(self)) })
     }
 }
 

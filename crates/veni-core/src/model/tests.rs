@@ -169,6 +169,6 @@ fn other_stored_types_are_unsupported() {
 fn the_embedded_model_decodes() {
     let model = Model::pretrained();
     let latent = Latent::from_seed(&model.prior(), 1);
-    let radiance = model.decoder().condition(&latent).unwrap().radiance([1.0, 0.0, 0.0]);
+    let radiance = model.decoder().unwrap().condition(&latent).unwrap().radiance([1.0, 0.0, 0.0]);
     assert!(radiance.iter().all(|v| v.is_finite() && *v > 0.0));
 }

@@ -60,7 +60,7 @@ fn main() -> Result<()> {
 
     let model = Model::load(&options.model)?;
     let latent = Latent::from_seed(&model.prior(), options.seed);
-    let field = model.decoder().condition(&latent)?;
+    let field = model.decoder()?.condition(&latent)?;
     // turning the latent turns the light, exactly
     let turn =
         options.turn.map_or_else(|| KEY_LIGHT.to_radians() - azimuth_of_light(&field), f64::to_radians);

@@ -76,7 +76,7 @@ impl GpuDecoder {
             vectors: storage(device, "veni vectors", bytemuck::cast_slice(&packed.vectors))?,
             pipelines: Pipelines::default(),
             device: device.clone(),
-            decoder: model.decoder(),
+            decoder: model.decoder()?,
             sizes: packed.sizes,
             model: model.hash(),
             kernel,

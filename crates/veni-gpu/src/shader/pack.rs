@@ -126,7 +126,7 @@ mod tests {
             assert_eq!(packed.vectors.len(), 4 * sizes.columns() * sizes.vector_rows());
             let latent = Latent::from_seed(&Prior::standard(n), 3);
             let mut block = vec![7.0];
-            pack_latent(sizes, &model.decoder().condition(&latent).unwrap(), &mut block);
+            pack_latent(sizes, &model.decoder().unwrap().condition(&latent).unwrap(), &mut block);
             assert_eq!(block.len(), 1 + 4 * sizes.latent_stride());
         }
     }

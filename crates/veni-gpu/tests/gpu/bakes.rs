@@ -11,7 +11,7 @@ use crate::util::{self, agrees, difference, filler, latent};
 
 fn cpu(model: &veni_core::model::Model, latent: &Latent, grid: Equirect) -> Vec<[f32; 3]> {
     let mut all = vec![[0.0; 3]; grid.len()];
-    model.decoder().condition(latent).unwrap().log_radiance_batch(&grid.directions(), &mut all);
+    model.decoder().unwrap().condition(latent).unwrap().log_radiance_batch(&grid.directions(), &mut all);
     all
 }
 
@@ -58,7 +58,7 @@ fn half_texels_are_clamped_never_infinite() {
     gpu.bake(&decoder, &latents, &Bake::equirect(&texture));
     let found = gpu.read_texture(&texture);
     let grid = Equirect::new(16, 8);
-    let expected = model.decoder().condition(&bright).unwrap().bake(grid);
+    let expected = model.decoder().unwrap().condition(&bright).unwrap().bake(grid);
     let (mut clamped, mut kept) = (0, 0);
     for (found, expected) in found.as_flattened().iter().zip(expected.as_flattened()) {
         if *expected > 65_536.0 {
@@ -89,7 +89,7 @@ fn rows_come_in_bands_and_in_order() {
     // 4096 × 600 takes two bands of 32 MiB
     let (width, height) = (4096u32, 600u32);
     let picture = Picture { grid: Grid::Equirect { width, height }, frame: Default::default() };
-    let field = model.decoder().condition(&latent).unwrap();
+    let field = model.decoder().unwrap().condition(&latent).unwrap();
     let grid = Equirect::new(width as usize, height as usize);
     let mut next = 0;
     bake_rows::<Error>(&decoder, &gpu.opened.queue, &latents, picture, |row, pixels| {
@@ -125,7 +125,7 @@ fn split(gpu: &util::Gpu) {
     let grid = Grid::Equirect { width: 16_384, height: 8_192 };
     gpu.bake(&decoder, &latents, &Bake::rows(&pixels, grid, 8_122..8_192).logarithm());
     let found = gpu.read(&pixels);
-    let field = model.decoder().condition(&latent(1, 1)).unwrap();
+    let field = model.decoder().unwrap().condition(&latent(1, 1)).unwrap();
     let whole = Equirect::new(16_384, 8_192);
     for (column, row) in [(0, 8_122), (16_383, 8_190), (5, 8_191), (9_000, 8_185)] {
         let expected = field.log_radiance(whole.direction(column, row));

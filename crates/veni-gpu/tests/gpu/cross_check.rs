@@ -17,7 +17,7 @@ fn compare(model: &Model, n: usize, name: &str, choice: KernelChoice, gpu: &util
     let found = gpu.log_radiance(&decoder, &latent, grid);
     let grid = Equirect::new(SIZE.0 as usize, SIZE.1 as usize);
     let mut expected = vec![[0.0; 3]; grid.len()];
-    let field = model.decoder().condition(&latent).unwrap();
+    let field = model.decoder().unwrap().condition(&latent).unwrap();
     field.log_radiance_batch(&grid.directions(), &mut expected);
     let off = difference(&found, &expected);
     say(&format!(
@@ -101,7 +101,7 @@ fn cube_faces_and_lists_in_every_frame() {
     let decoder = GpuDecoder::new(&gpu.opened.device, &model).unwrap();
     let latent = latent(9, 2);
     let turn = 0.7;
-    let field = model.decoder().condition(&latent).unwrap().turned(turn).brightened(0.5);
+    let field = model.decoder().unwrap().condition(&latent).unwrap().turned(turn).brightened(0.5);
     let latents = decoder.condition(&gpu.opened.queue, &latent).unwrap();
     let size = 4;
     for frame in Frame::ALL {

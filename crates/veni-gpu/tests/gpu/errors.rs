@@ -58,7 +58,7 @@ fn what_does_not_fit_is_named() {
     queue.submit([encoder.finish()]);
     let found = gpu.log_radiance(&decoder, &latent(4, 1), grid);
     let mut expected = vec![[0.0; 3]; 32];
-    let field = model.decoder().condition(&latent(4, 1)).unwrap();
+    let field = model.decoder().unwrap().condition(&latent(4, 1)).unwrap();
     field.log_radiance_batch(&Equirect::new(8, 4).directions(), &mut expected);
     assert!(agrees(difference(&found, &expected)));
 }

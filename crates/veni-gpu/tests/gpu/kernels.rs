@@ -25,7 +25,7 @@ impl Work {
         let packed = pack_model(model);
         let mut blocks = Vec::new();
         for latent in latents {
-            pack_latent(packed.sizes, &model.decoder().condition(latent).unwrap(), &mut blocks);
+            pack_latent(packed.sizes, &model.decoder().unwrap().condition(latent).unwrap(), &mut blocks);
         }
         let count = directions.len() as u32;
         let request = Request {

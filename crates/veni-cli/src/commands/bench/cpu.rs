@@ -24,7 +24,7 @@ impl Subject for Cpu {
     }
 
     fn load(&mut self, case: &Case) -> Result<Box<dyn Bakes>> {
-        Ok(Box::new(case.model.decoder().condition(&case.latent)?))
+        Ok(Box::new(case.model.decoder()?.condition(&case.latent)?))
     }
 }
 

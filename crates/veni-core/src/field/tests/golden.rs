@@ -120,7 +120,7 @@ impl Case {
 
 fn decode(model: &Model, vectors: &[[f32; 3]], directions: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let mut out = vec![[0.0; 3]; directions.len()];
-    let field = model.decoder().condition(&Latent::new(vectors.to_vec())).unwrap();
+    let field = model.decoder().unwrap().condition(&Latent::new(vectors.to_vec())).unwrap();
     field.log_radiance_batch(directions, &mut out);
     out
 }
@@ -147,7 +147,7 @@ fn scale_is_a_log_exposure() {
     latent.log_exposure = case.tensors["in.scale"].data[0];
     let directions = case.triples("in.directions");
     let mut out = vec![[0.0; 3]; directions.len()];
-    model.decoder().condition(&latent).unwrap().log_radiance_batch(&directions, &mut out);
+    model.decoder().unwrap().condition(&latent).unwrap().log_radiance_batch(&directions, &mut out);
     case.check("out.rgb", &out);
 }
 

@@ -15,7 +15,7 @@ fn log(field: &crate::field::Field, directions: &[[f32; 3]]) -> Vec<[f32; 3]> {
 fn turning_the_latent_turns_the_sky() {
     let directions = directions(500);
     for n in [9, 100] {
-        let (decoder, latent) = (filler(n).decoder(), Latent::from_seed(&Prior::standard(n), 5));
+        let (decoder, latent) = (filler(n).decoder().unwrap(), Latent::from_seed(&Prior::standard(n), 5));
         let still = decoder.condition(&latent).unwrap();
         for angle in [0.1, 1.0, 2.5, -3.0, 100.0f64] {
             let (sin, cos) = angle.sin_cos();
@@ -48,7 +48,7 @@ fn turning_the_latent_turns_the_sky() {
 /// A quarter turn of the field moves the baked columns by a quarter of the width.
 #[test]
 fn turned_bake_is_a_column_shift() {
-    let field = filler(9).decoder().condition(&Latent::from_seed(&Prior::standard(9), 2)).unwrap();
+    let field = filler(9).decoder().unwrap().condition(&Latent::from_seed(&Prior::standard(9), 2)).unwrap();
     let grid = Equirect::new(32, 16);
     let (still, turned) = (field.bake(grid), field.turned(std::f64::consts::FRAC_PI_2).bake(grid));
     for (a, b) in still.chunks(32).zip(turned.chunks(32)) {
@@ -66,7 +66,7 @@ fn every_entry_point_gives_the_same_bits() {
         let n = model.latent_vectors();
         let mut latent = Latent::from_seed(&Prior::standard(n), 8);
         latent.log_exposure = 0.4;
-        let field = model.decoder().condition(&latent).unwrap();
+        let field = model.decoder().unwrap().condition(&latent).unwrap();
         let grid = Equirect::new(67, 31);
         let directions = grid.directions();
         let mut batch = vec![[0.0; 3]; directions.len()];
@@ -93,7 +93,7 @@ fn every_entry_point_gives_the_same_bits() {
 
 #[test]
 fn a_range_of_rows_and_an_early_end() {
-    let field = filler(2).decoder().condition(&Latent::from_seed(&Prior::standard(2), 8)).unwrap();
+    let field = filler(2).decoder().unwrap().condition(&Latent::from_seed(&Prior::standard(2), 8)).unwrap();
     let grid = Equirect::new(16, 8);
     let whole = field.bake(grid);
     let mut seen = vec![];
@@ -109,7 +109,7 @@ fn a_range_of_rows_and_an_early_end() {
 
 #[test]
 fn exposure_scales_radiance() {
-    let decoder = filler(9).decoder();
+    let decoder = filler(9).decoder().unwrap();
     let mut latent = Latent::from_seed(&Prior::standard(9), 1);
     let dim = decoder.condition(&latent).unwrap();
     latent.log_exposure = 8f32.ln();
@@ -126,7 +126,7 @@ fn exposure_scales_radiance() {
 #[test]
 fn poles_and_a_zero_latent_are_finite() {
     for form in [VnReluForm::Projection, VnReluForm::Reference, VnReluForm::ReferenceNormGuard] {
-        let decoder = odd(9, 16, form).decoder();
+        let decoder = odd(9, 16, form).decoder().unwrap();
         for latent in [Latent::new(vec![[0.0; 3]; 9]), Latent::from_seed(&Prior::standard(9), 1)] {
             let field = decoder.condition(&latent).unwrap();
             for direction in [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [-0.0, 0.0, 1.0], [1.0, 0.0, 0.0]] {
@@ -139,7 +139,7 @@ fn poles_and_a_zero_latent_are_finite() {
 #[test]
 fn unusable_latents_are_refused_with_the_reason() {
     let model = filler(9);
-    let decoder = model.decoder();
+    let decoder = model.decoder().unwrap();
     let good = Latent::from_seed(&Prior::standard(9), 1);
     let reason = |change: &dyn Fn(&mut Latent)| {
         let mut latent = good.clone();
@@ -158,7 +158,7 @@ fn unusable_latents_are_refused_with_the_reason() {
 /// What is far out in log radiance stays a finite, positive radiance.
 #[test]
 fn extreme_exposures_stay_finite() {
-    let decoder = filler(9).decoder();
+    let decoder = filler(9).decoder().unwrap();
     let mut latent = Latent::from_seed(&Prior::standard(9), 1);
     for exposure in [-300.0, 300.0] {
         latent.log_exposure = exposure;
@@ -188,7 +188,7 @@ fn every_simd_width_gives_the_same_result() {
         }
     }
 
-    let field = filler(30).decoder().condition(&Latent::from_seed(&Prior::standard(30), 4)).unwrap();
+    let field = filler(30).decoder().unwrap().condition(&Latent::from_seed(&Prior::standard(30), 4)).unwrap();
     let directions = directions(101);
     let widest = pulp::Arch::new().dispatch(With(&field, &directions));
     let scalar = With(&field, &directions).with_simd(pulp::Scalar::new());

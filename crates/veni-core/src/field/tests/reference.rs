@@ -96,7 +96,7 @@ fn plain(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> Vec<[f32; 3
 
 fn fast(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let mut out = vec![[0.0; 3]; directions.len()];
-    model.decoder().condition(latent).unwrap().log_radiance_batch(directions, &mut out);
+    model.decoder().unwrap().condition(latent).unwrap().log_radiance_batch(directions, &mut out);
     out
 }
 
