@@ -4,6 +4,7 @@
 mod bad_input;
 mod bake;
 mod encode;
+mod evaluate;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod inspect;

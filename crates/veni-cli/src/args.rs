@@ -46,6 +46,8 @@ pub(crate) enum Command {
     Sample(commands::sample::Sample),
     #[cfg(feature = "learn")]
     Encode(commands::encode::Encode),
+    #[cfg(feature = "learn")]
+    Evaluate(commands::evaluate::Evaluate),
     Inspect(commands::inspect::Inspect),
     Bench(commands::bench::Bench),
     #[cfg(feature = "learn")]

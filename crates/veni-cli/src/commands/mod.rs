@@ -5,6 +5,8 @@ pub(crate) mod bench;
 pub(crate) mod completions;
 #[cfg(feature = "learn")]
 pub(crate) mod encode;
+#[cfg(feature = "learn")]
+pub(crate) mod evaluate;
 pub(crate) mod inspect;
 pub(crate) mod man;
 pub(crate) mod sample;
@@ -23,6 +25,8 @@ pub(crate) fn run(command: Command, report: Report) -> Result<Outcome> {
         Command::Sample(c) => c.run(report),
         #[cfg(feature = "learn")]
         Command::Encode(c) => c.run(report),
+        #[cfg(feature = "learn")]
+        Command::Evaluate(c) => c.run(report),
         Command::Inspect(c) => c.run(report),
         Command::Bench(c) => c.run(report),
         #[cfg(feature = "learn")]
