@@ -11,8 +11,12 @@ use crate::util::{Dir, model, panorama, panoramas, text};
 
 /// Arguments that are quick on two panoramas of 64 × 32 pixels.
 fn args<'a>(protocol: &'a str, data: &'a str, rest: &[&'a str]) -> Vec<&'a str> {
+    args_on("2", protocol, data, rest)
+}
+
+fn args_on<'a>(images: &'a str, protocol: &'a str, data: &'a str, rest: &[&'a str]) -> Vec<&'a str> {
     let mut args = vec!["evaluate", protocol, "--model", model(), "--data", data, "--out", "eval", "--quick"];
-    args.extend(["--images", "2", "--size", "64", "--pairs", "20", "--frames", "3"]);
+    args.extend(["--images", images, "--size", "64", "--pairs", "20", "--frames", "3"]);
     args.extend(rest);
     args
 }
@@ -59,9 +63,7 @@ fn reconstruction_prints_a_table_and_keeps_its_results() {
 #[test]
 fn a_killed_evaluation_goes_on() {
     let (dir, data) = (Dir::new(), text(panoramas()));
-    let args = [&args("uniqueness", &data, &["--images", "8"])[..]].concat();
-    let args: Vec<_> =
-        args.iter().enumerate().filter(|(i, _)| !(9..11).contains(i)).map(|(_, a)| *a).collect();
+    let args = args_on("8", "uniqueness", &data, &[]);
     let whole = Dir::new();
     let expected = whole.json(&args);
     assert_eq!(kept_count(&whole), 8);
@@ -232,16 +234,19 @@ fn bad_input_is_refused_before_anything_is_made() {
     std::fs::remove_file(dir.path("eval/thesis.tex")).unwrap();
 
     // what only one protocol minds comes after the folder was made
-    let few = |protocol, rest: &[&str], word: &str| {
+    let few = |protocol, count: &str, word: &str| {
         let (dir, one) = (Dir::new(), panorama());
-        let args = [&args(protocol, &one, &[])[..]].concat();
-        let args: Vec<_> = args.iter().map(|a| if *a == "20" || *a == "3" { rest[0] } else { *a }).collect();
+        let mut args = args(protocol, &one, &[]);
+        for name in ["--pairs", "--frames"] {
+            let at = args.iter().position(|a| *a == name).unwrap();
+            args[at + 1] = count;
+        }
         let run = dir.run(&args);
         assert!(run.code == Some(2) && run.out.is_empty() && run.err.contains(word), "{}", run.err);
         assert_eq!(run.err.lines().count(), 1, "{}", run.err);
     };
-    few("consistency", &["2"], "2 pairs");
-    few("interpolation", &["2"], "too few");
+    few("consistency", "2", "2 pairs");
+    few("interpolation", "2", "too few");
 }
 
 #[test]

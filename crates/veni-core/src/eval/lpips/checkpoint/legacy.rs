@@ -4,8 +4,9 @@
 use std::collections::BTreeMap;
 
 use super::View;
+use super::arena::{Arena, Value};
 use super::bytes::{array, at};
-use super::pickle::{self, Arena, Value};
+use super::pickle;
 use super::torch::{self, Storage};
 use crate::{Error, Result};
 

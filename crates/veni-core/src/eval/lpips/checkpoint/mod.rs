@@ -3,6 +3,7 @@
 //! PyTorch's files are a pickle that describes dictionaries of tensors, and raw storages the tensors are views of:
 //! inside a zip archive (since PyTorch 1.6), or one after the other (before). Only what is asked for is copied.
 
+mod arena;
 mod bytes;
 mod legacy;
 mod pickle;

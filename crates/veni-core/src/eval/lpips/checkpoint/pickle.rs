@@ -1,56 +1,10 @@
 //! The part of Python's pickle language that PyTorch's files use. Nothing is executed: classes and functions are names.
-//!
-//! Values live in an arena and refer to each other by index, so that shared, cyclic or deeply nested data costs
-//! neither copies nor stack.
 
 use std::collections::HashMap;
 
+use super::arena::{Arena, Id, Value};
 use super::bytes::{array, at, u16_at, u32_at};
 use crate::{Error, Result};
-
-/// Index of a value in its [`Arena`].
-pub(super) type Id = usize;
-
-/// A Python value, as far as it matters here.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Value {
-    /// An integer of at most 64 bits.
-    Int(i64),
-    /// Text.
-    Text(String),
-    /// A list or tuple.
-    Sequence(Vec<Id>),
-    /// A dictionary, ordered or not.
-    Map(Vec<(Id, Id)>),
-    /// A class or function, `module name`.
-    Global(String),
-    /// What a persistent identifier stands for: in PyTorch's files a storage.
-    Persistent(Id),
-    /// The call of a global with its arguments (a sequence).
-    Call(String, Id),
-    /// Anything that no tensor depends on.
-    Other,
-}
-
-/// All values of a pickle.
-#[derive(Debug, Default)]
-pub(super) struct Arena(Vec<Value>);
-
-impl Arena {
-    pub(super) fn get(&self, id: Id) -> &Value {
-        &self.0[id]
-    }
-
-    /// Number of values so far.
-    pub(super) fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    fn push(&mut self, value: Value) -> Id {
-        self.0.push(value);
-        self.0.len() - 1
-    }
-}
 
 /// Reads one pickle that starts at `position`: its value, and where it ends.
 ///
@@ -252,7 +206,7 @@ impl Machine<'_> {
     fn extend(&mut self, count: usize) -> Result<()> {
         let items = self.last(count)?;
         let target = *self.stack.last().ok_or_else(|| damaged("items without a list"))?;
-        if let Value::Sequence(list) = &mut self.arena.0[target] {
+        if let Value::Sequence(list) = self.arena.get_mut(target) {
             list.extend(items);
         }
         Ok(())
@@ -261,7 +215,7 @@ impl Machine<'_> {
     fn insert(&mut self, count: usize) -> Result<()> {
         let items = self.last(count)?;
         let target = *self.stack.last().ok_or_else(|| damaged("entries without a dictionary"))?;
-        if let Value::Map(map) = &mut self.arena.0[target] {
+        if let Value::Map(map) = self.arena.get_mut(target) {
             map.extend(items.as_chunks().0.iter().map(|[key, value]| (*key, *value)));
         }
         Ok(())

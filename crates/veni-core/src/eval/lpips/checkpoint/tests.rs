@@ -149,7 +149,7 @@ fn views_stay_inside_of_their_storage() {
         let mut pickle = Writer(b"\x80\x02}(".to_vec());
         pickle.tensor("far", ("FloatStorage", "7", 6), offset, [&shape, &strides]);
         pickle.0.extend(b"u.");
-        let mut arena = pickle::Arena::default();
+        let mut arena = arena::Arena::default();
         let (root, _) = pickle::read(&pickle.0, 0, &mut arena).unwrap();
         let views = torch::views(&arena, root, &|_| Some(0..24)).unwrap();
         let checkpoint = Checkpoint { file: vec![0; 24], views };
@@ -159,15 +159,15 @@ fn views_stay_inside_of_their_storage() {
 
 #[test]
 fn pickles_that_would_run_code_or_never_end_are_refused() {
-    let read = |bytes: &[u8]| pickle::read(bytes, 0, &mut pickle::Arena::default());
+    let read = |bytes: &[u8]| pickle::read(bytes, 0, &mut arena::Arena::default());
     // protocol 0's instance opcode
     assert!(
         matches!(read(b"(S'rm'\nios\nsystem\n."), Err(Error::Unsupported(m)) if m.contains("safetensors"))
     );
     // a call is kept as a name, never made
-    let mut arena = pickle::Arena::default();
+    let mut arena = arena::Arena::default();
     let (call, _) = pickle::read(b"\x80\x02cos\nsystem\nU\x02rm\x85R.", 0, &mut arena).unwrap();
-    assert!(matches!(arena.get(call), pickle::Value::Call(name, _) if name == "os system"));
+    assert!(matches!(arena.get(call), arena::Value::Call(name, _) if name == "os system"));
     for broken in [&b"."[..], b"e.", b"t.", b"h\x01.", b"s.", b"R.", b"\x93."] {
         assert!(matches!(read(broken), Err(Error::Invalid(_))), "{broken:?}");
     }
@@ -182,7 +182,7 @@ fn pickles_that_would_run_code_or_never_end_are_refused() {
         nested.0.extend([b'u', b'q', level + 1]);
     }
     nested.0.push(b'.');
-    let mut arena = pickle::Arena::default();
+    let mut arena = arena::Arena::default();
     let (root, _) = pickle::read(&nested.0, 0, &mut arena).unwrap();
     assert!(torch::views(&arena, root, &|_| None).unwrap().is_empty());
 }

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::pickle::{self, Arena, Id, Value};
+use super::arena::{Arena, Id, Value};
+use super::pickle;
 use super::{Element, View, zip};
 use crate::{Error, Result};
 
