@@ -4,6 +4,7 @@
 mod bad_input;
 mod bake;
 mod encode;
+mod evaluate;
 mod fit;
 #[cfg(feature = "gpu")]
 mod gpu;

@@ -49,6 +49,8 @@ pub(crate) enum Command {
     #[cfg(feature = "learn")]
     Fit(commands::fit::Fit),
     RenderProbe(commands::render_probe::RenderProbe),
+    #[cfg(feature = "learn")]
+    Evaluate(commands::evaluate::Evaluate),
     Inspect(commands::inspect::Inspect),
     Bench(commands::bench::Bench),
     #[cfg(feature = "learn")]

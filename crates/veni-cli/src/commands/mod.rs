@@ -6,6 +6,8 @@ pub(crate) mod completions;
 #[cfg(feature = "learn")]
 pub(crate) mod encode;
 #[cfg(feature = "learn")]
+pub(crate) mod evaluate;
+#[cfg(feature = "learn")]
 pub(crate) mod fit;
 pub(crate) mod inspect;
 pub(crate) mod man;
@@ -29,6 +31,8 @@ pub(crate) fn run(command: Command, report: Report) -> Result<Outcome> {
         #[cfg(feature = "learn")]
         Command::Fit(c) => c.run(report),
         Command::RenderProbe(c) => c.run(report),
+        #[cfg(feature = "learn")]
+        Command::Evaluate(c) => c.run(report),
         Command::Inspect(c) => c.run(report),
         Command::Bench(c) => c.run(report),
         #[cfg(feature = "learn")]

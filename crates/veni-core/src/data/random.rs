@@ -25,6 +25,8 @@ pub enum Purpose {
     Weights,
     /// Starting points of a latent optimisation.
     Fit,
+    /// Latents that an evaluation draws.
+    Evaluation,
 }
 
 /// The stream for `purpose` at (`step`, `slot`) of the run with this `seed`.

@@ -4,11 +4,13 @@
 
 mod alignment;
 mod correlation;
+mod log_error;
 mod psnr;
 mod ssim;
 
 pub use alignment::{Alignment, exposure_offset, log_factor};
 pub use correlation::{pearson, ranks, spearman};
+pub use log_error::{log_error, weighted_log_error};
 pub use psnr::psnr;
 pub use ssim::ssim;
 

@@ -1,0 +1,238 @@
+//! `veni-cli evaluate`: the experiments of the paper on models and panoramas of one's own.
+
+mod inputs;
+mod watch;
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::{Args, ValueEnum};
+use veni_core::eval::lpips::{self, Lpips};
+use veni_core::eval::protocol::paper::{self, Published};
+use veni_core::eval::protocol::{
+    Evaluation, Report as Findings, Settings, ablations, consistency, dataset_size, equivariance,
+    interpolation, reconstruction, uniqueness,
+};
+use veni_core::eval::store::Store;
+use veni_core::eval::table::{Format, Table};
+use veni_core::output::{Overwrite, write_atomic};
+use veni_core::sphere::Equirect;
+use veni_core::train::config::DeviceKind;
+use veni_core::{Error, data::Dataset};
+
+use crate::output::with_remedy;
+use crate::report::{Outcome, Report, to_stdout};
+use crate::size::Size;
+use watch::Bars;
+
+/// The fewest rows on which structural similarity is defined.
+const MIN_HEIGHT: usize = 8;
+
+/// Run an experiment of the paper on models and panoramas
+#[derive(Args, Debug)]
+#[command(
+    long_about = "Run an experiment of the paper on models and panoramas.\n\n\
+        Tables go to stdout and, with those of every panorama, into OUT, beside figures (PNG). Whatever takes long is \
+        kept in OUT/results, one small file per panorama and setting: run the same command again after a stop and it \
+        goes on; run it with other models, panoramas or settings and only what is new is computed.\n\n\
+        DIR holds equirectangular OpenEXR or Radiance files; of a folder with train/ and val/ inside, val/ is taken. \
+        Every definition is in docs/MODEL.md, Evaluation.\n\n\
+        LPIPS needs weights, which do not come with this program: name a safetensors file or what torch.save wrote, \
+        with AlexNet's features (torchvision's alexnet-owt-….pth, 'features.N.weight') and the five heads (the lpips \
+        package's weights/v0.1/alex.pth, 'linL.model.1.weight'), in one file or in two; a checkpoint of the authors' \
+        trainer has both. Without, the column says \"no weights\".",
+    after_help = "Examples:\n  \
+        veni-cli evaluate reconstruction --data hdri --out eval\n  \
+        veni-cli evaluate reconstruction --model ours=runs/a base=runs/b --data hdri --out eval --quick\n  \
+        veni-cli evaluate uniqueness --model runs/a --data hdri --images 20 --out eval --table csv\n  \
+        veni-cli evaluate paper --model veni=runs/a reni=runs/r --data hdri --out eval --lpips alexnet.pth alex.pth"
+)]
+pub(crate) struct Evaluate {
+    /// The experiment
+    #[arg(value_enum)]
+    protocol: Protocol,
+
+    /// Models (.safetensors, or training runs' folders), each with a name for the tables if one is given
+    /// [default: the one inside this program]
+    #[arg(long = "model", short, value_name = "[NAME=]FILE", num_args = 1..)]
+    models: Vec<String>,
+
+    /// Folders of panoramas (or files)
+    #[arg(long, value_name = "DIR", num_args = 1.., required = true)]
+    data: Vec<PathBuf>,
+
+    /// Folder of tables, figures and kept results, created if missing
+    #[arg(long, short, value_name = "OUT")]
+    out: PathBuf,
+
+    /// How tables are written
+    #[arg(long, value_enum, default_value_t)]
+    table: TableFormat,
+
+    /// Weights for LPIPS
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    lpips: Vec<PathBuf>,
+
+    /// Fewer steps, pixels and pairs: a trend in minutes
+    #[arg(long)]
+    quick: bool,
+
+    /// Seed of everything random
+    #[arg(long, short, value_name = "S", default_value = "0")]
+    seed: u64,
+
+    /// Only the first so many panoramas by name
+    #[arg(long, value_name = "COUNT")]
+    images: Option<usize>,
+
+    /// Width, or width x height, at which panoramas are compared
+    #[arg(long, value_name = "W|WxH", default_value = "128")]
+    size: Size,
+
+    /// Pairs of random latents (consistency) [default: 1000, quick: 200]
+    #[arg(long, value_name = "COUNT")]
+    pairs: Option<usize>,
+
+    /// Frames per pair, both ends included (interpolation)
+    #[arg(long, value_name = "COUNT", default_value = "9")]
+    frames: usize,
+
+    /// Numbers of the article to stand beside ours (paper): JSON {table: {row: {column: number}}}
+    #[arg(long, value_name = "FILE")]
+    published: Option<PathBuf>,
+}
+
+/// The experiments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Protocol {
+    /// How much of a panorama survives: PSNR, SSIM, LPIPS through the encoder and optimised
+    Reconstruction,
+    /// Two fits of one panorama from random starts: are they the same code?
+    Uniqueness,
+    /// Rank correlation of distances between latents and between their images
+    Consistency,
+    /// Strips from one panorama to the next, and how even their steps are
+    Interpolation,
+    /// Encoder, decoder and both under turns and reflections
+    Equivariance,
+    /// Reconstruction by models trained on more and fewer panoramas
+    DatasetSize,
+    /// Models that differ in one part, side by side
+    Ablations,
+    /// All of them, with published numbers beside ours
+    Paper,
+}
+
+/// How tables are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TableFormat {
+    /// Markdown, rounded
+    #[default]
+    Md,
+    /// Comma-separated values with all digits
+    Csv,
+    /// One line of JSON per table with all digits
+    Json,
+}
+
+impl From<TableFormat> for Format {
+    fn from(format: TableFormat) -> Self {
+        match format {
+            TableFormat::Md => Self::Markdown,
+            TableFormat::Csv => Self::Csv,
+            TableFormat::Json => Self::Json,
+        }
+    }
+}
+
+impl Evaluate {
+    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        let grid = self.grid()?;
+        if self.published.is_some() && self.protocol != Protocol::Paper {
+            bail!("--published: only 'evaluate paper' shows published numbers; leave it out");
+        }
+        let published = self.published.as_deref().map(Published::load).transpose()?.unwrap_or_default();
+        let files = inputs::panoramas(&self.data, self.images)?;
+        inputs::check_folder(&self.out)?;
+        let device = DeviceKind::Flex;
+        let subjects = inputs::subjects(&self.models, device)?;
+        let lpips =
+            if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
+        let data = Dataset::load(&files, grid)?;
+        inputs::create_folder(&self.out)?;
+        let (store, figures, bars) = (Store::new(&self.out), self.out.join("figures"), Bars::new(report));
+        let settings =
+            Settings { seed: self.seed, quick: self.quick, pairs: self.pairs, frames: self.frames };
+        let evaluation = Evaluation {
+            subjects: &subjects,
+            others: &[],
+            data: &data,
+            lpips: lpips.as_ref(),
+            settings,
+            store: &store,
+            figures: &figures,
+            watch: &bars,
+        };
+        let found = self.protocol.run(&evaluation, &published).map_err(with_remedy);
+        bars.finish();
+        self.show(&found?, report)?;
+        Ok(Outcome::Fine)
+    }
+
+    fn grid(&self) -> Result<Equirect> {
+        let (width, height) = self.size.equirect()?;
+        let least = if self.lpips.is_empty() { MIN_HEIGHT } else { lpips::MIN_SIDE };
+        if height < least {
+            bail!(
+                "--size {}: {height} rows are too few for the metrics; give at least {}x{least}",
+                self.size,
+                2 * least
+            );
+        }
+        Ok(Equirect::new(width, height))
+    }
+
+    /// Tables to files and stdout; what else was written is said on stderr.
+    fn show(&self, found: &Findings, report: Report) -> Result<()> {
+        let format = if report.is_json() { Format::Json } else { self.table.into() };
+        for table in found.tables.iter().chain(&found.details) {
+            self.save(table, format)?;
+        }
+        let texts: Vec<_> = found.tables.iter().map(|table| table.render(format)).collect();
+        to_stdout(texts.join(if format == Format::Json { "" } else { "\n" }).as_bytes())?;
+        let figures: Vec<_> = found.figures.iter().filter_map(|f| f.file_name()).collect();
+        let figures: Vec<_> = figures.iter().map(|f| f.to_string_lossy()).collect();
+        report.note(format_args!(
+            "{}: tables of {} kinds{}{}",
+            self.out.display(),
+            found.tables.len() + found.details.len(),
+            if figures.is_empty() { "" } else { ", figures " },
+            figures.join(", ")
+        ));
+        Ok(())
+    }
+
+    fn save(&self, table: &Table, format: Format) -> Result<()> {
+        let path = self.out.join(format!("{}.{}", table.name, format.extension()));
+        let text = table.render(format);
+        write_atomic(&path, Overwrite::Replace, |file| {
+            std::io::Write::write_all(file, text.as_bytes()).map_err(|e| Error::io(&path, "write", e))
+        })
+        .map_err(with_remedy)
+    }
+}
+
+impl Protocol {
+    fn run(self, evaluation: &Evaluation<'_>, published: &Published) -> veni_core::Result<Findings> {
+        match self {
+            Self::Reconstruction => reconstruction::run(evaluation),
+            Self::Uniqueness => uniqueness::run(evaluation),
+            Self::Consistency => consistency::run(evaluation),
+            Self::Interpolation => interpolation::run(evaluation),
+            Self::Equivariance => equivariance::run(evaluation),
+            Self::DatasetSize => dataset_size::run(evaluation),
+            Self::Ablations => ablations::run(evaluation),
+            Self::Paper => paper::run(evaluation, published),
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Models, panoramas and the output folder of an evaluation.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use veni_core::Error;
+use veni_core::data::panorama_files;
+use veni_core::eval::subject::Subject;
+use veni_core::output::{Overwrite, write_atomic};
+use veni_core::train::config::DeviceKind;
+
+use crate::args::ModelArgs;
+use crate::output::{folder_of, with_remedy, writable};
+use crate::source;
+
+/// Says that a folder is an evaluation's.
+const MARKER: &str = "evaluation.json";
+
+/// The models to compare, under distinct names.
+pub(super) fn subjects(models: &[String], device: DeviceKind) -> Result<Vec<Subject>> {
+    let given = if models.is_empty() {
+        vec![("veni".to_owned(), None)]
+    } else {
+        models.iter().map(|text| named(text)).collect::<Result<_>>()?
+    };
+    // figures are named after their model
+    let plain =
+        |name: &str| name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect::<String>();
+    for (at, (name, _)) in given.iter().enumerate() {
+        if given[..at].iter().any(|(other, _)| plain(other) == plain(name)) {
+            bail!("--model: two models are called {name}; give each its own name with --model NAME=FILE");
+        }
+    }
+    let device = device.device()?;
+    let load = |(name, path): (String, Option<PathBuf>)| {
+        let loaded = source::model(&ModelArgs { model: path })?;
+        Ok(Subject::new(name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?)
+    };
+    given.into_iter().map(load).collect()
+}
+
+/// `NAME=FILE`, or a file that is named after itself (a run after its folder).
+fn named(text: &str) -> Result<(String, Option<PathBuf>)> {
+    let path = PathBuf::from(text);
+    if let Some((name, file)) = text.split_once('=')
+        && !path.exists()
+        && !name.contains(['/', '\\'])
+    {
+        if name.trim().is_empty() || file.is_empty() {
+            bail!("--model {text}: give a name and a file, like ours=model.safetensors");
+        }
+        return Ok((name.trim().to_owned(), Some(PathBuf::from(file))));
+    }
+    let own = path.file_stem().filter(|stem| *stem != "model").or_else(|| path.parent()?.file_name());
+    let name = own.map_or_else(|| text.to_owned(), |name| name.to_string_lossy().into_owned());
+    Ok((name, Some(path)))
+}
+
+/// The panorama files, by name; of a folder with `val/` inside those in it.
+pub(super) fn panoramas(data: &[PathBuf], most: Option<usize>) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for folder in data {
+        let val = folder.join("val");
+        files.extend(panorama_files(if val.is_dir() { &val } else { folder })?);
+    }
+    files.sort();
+    files.dedup();
+    files.truncate(most.unwrap_or(usize::MAX));
+    if files.is_empty() {
+        let names: Vec<_> = data.iter().map(|d| d.display().to_string()).collect();
+        bail!("{}: no .exr or .hdr panorama to evaluate on", names.join(", "));
+    }
+    Ok(files)
+}
+
+/// Refuses a folder that is in use for something else, before any work.
+pub(super) fn check_folder(out: &Path) -> Result<()> {
+    if !out.exists() {
+        let mut above = folder_of(out);
+        while !above.exists() && above != Path::new(".") {
+            above = folder_of(above);
+        }
+        return writable(above, out);
+    }
+    if !out.is_dir() {
+        bail!("{}: is a file; name a folder for the evaluation with --out", out.display());
+    }
+    let mut entries = std::fs::read_dir(out).map_err(|e| Error::io(out, "list", e))?;
+    if entries.next().is_some() && !out.join(MARKER).is_file() {
+        bail!("{}: is not empty and no evaluation's folder; name a new one with --out", out.display());
+    }
+    writable(out, out)
+}
+
+/// Creates the folder with its marker.
+pub(super) fn create_folder(out: &Path) -> Result<()> {
+    std::fs::create_dir_all(out).map_err(|e| Error::io(out, "create", e))?;
+    let marker = out.join(MARKER);
+    write_atomic(&marker, Overwrite::Replace, |file| {
+        file.write_all(b"{\"format\":1,\"program\":\"veni-cli evaluate\"}\n")
+            .map_err(|e| Error::io(&marker, "write", e))
+    })
+    .map_err(with_remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_are_called_what_they_are_told_or_after_their_files() {
+        let name = |text: &str| named(text).unwrap().0;
+        assert_eq!(name("ours=runs/a"), "ours");
+        assert_eq!(name("runs/a"), "a");
+        assert_eq!(name("runs/a/model.safetensors"), "a");
+        assert_eq!(name("weights/veni-27.safetensors"), "veni-27");
+        assert_eq!(name("x/a=b.safetensors"), "a=b");
+        assert!(named("=x").is_err() && named("a=").is_err());
+    }
+}

@@ -1,0 +1,82 @@
+//! The one place where evaluation calls the latent optimiser.
+
+use serde_json::{Value, json};
+
+use super::subject::Subject;
+use crate::Result;
+use crate::data::coarsen::{averaged, coarse_grid};
+use crate::fit::{self, FitConfig, FitResult, FitTarget};
+use crate::latent::Latent;
+use crate::sphere::Equirect;
+use crate::train::schedule::{LearningRate, Ramp};
+
+/// How a latent is fitted to an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitSettings {
+    /// Objective, steps, rates.
+    pub config: FitConfig,
+    /// The fit sees means over so many by so many pixels.
+    pub factor: usize,
+}
+
+impl FitSettings {
+    /// Solid-angle-weighted log error, 400 steps on a quarter of the pixels; `quick`: 100 steps on a sixteenth.
+    pub fn thorough(grid: Equirect, quick: bool) -> Self {
+        let config = FitConfig::thorough();
+        let config =
+            if quick { FitConfig { steps: 100, learning_rate: falling(100), ..config } } else { config };
+        Self { config, factor: dividing(grid, if quick { 4 } else { 2 }) }
+    }
+
+    /// The authors' helper: 2000 steps on every pixel, rates from `rates[0]` to `rates[1]`; `quick`: 300 steps on a
+    /// sixteenth of the pixels.
+    pub fn reference(grid: Equirect, rates: [f64; 2], quick: bool) -> Self {
+        let [first, last] = rates;
+        let steps = if quick { 300 } else { 2000 };
+        let config = FitConfig::reference_helper(first, last, steps);
+        Self { config, factor: if quick { dividing(grid, 4) } else { 1 } }
+    }
+
+    /// Everything that decides a result.
+    pub fn key(&self) -> Value {
+        json!({ "config": self.config, "factor": self.factor })
+    }
+
+    /// In words, for tables.
+    pub fn describe(&self) -> String {
+        let every = match self.factor {
+            1 => "every pixel".to_owned(),
+            n => format!("means over {n} × {n} pixels"),
+        };
+        format!("{} Adam steps on {every}", self.config.steps)
+    }
+
+    /// Fits one latent to each image (log radiance at exposure 0 on `grid`).
+    ///
+    /// # Errors
+    /// As [`fit::fit`].
+    pub fn fit(
+        &self,
+        subject: &Subject,
+        grid: Equirect,
+        images: &[&[f32]],
+        start: &[Latent],
+    ) -> Result<FitResult> {
+        let images: Vec<_> = images.iter().map(|image| averaged(grid, image, self.factor)).collect();
+        let images: Vec<_> = images.iter().map(Vec::as_slice).collect();
+        let grid = coarse_grid(grid, self.factor);
+        let target = FitTarget { grid, directions: None, images: &images, masks: None };
+        fit::fit(subject.network(), &target, start, &self.config)
+    }
+}
+
+/// The rates of [`FitConfig::thorough`], falling in so many steps.
+fn falling(steps: u64) -> LearningRate {
+    LearningRate::Exponential { rate: 5e-2, last: 2e-3, steps, warm_up: 0, before: 0.0, ramp: Ramp::Cosine }
+}
+
+/// The largest of `most`, `most`/2, … that divides both sides.
+fn dividing(grid: Equirect, most: usize) -> usize {
+    let divides = |n: &usize| grid.width.is_multiple_of(*n) && grid.height.is_multiple_of(*n);
+    std::iter::successors(Some(most), |n| (*n > 1).then_some(n / 2)).find(divides).unwrap_or(1)
+}

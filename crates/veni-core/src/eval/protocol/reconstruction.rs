@@ -1,0 +1,82 @@
+//! `reconstruction`: how much of a panorama survives D numbers.
+//!
+//! Each panorama is coded by each codec (a model's autoencoder pass: the posterior's mean; its optimised pass: a latent
+//! fitted from there; the bases given beside), decoded, and scored under both definitions of the metrics.
+
+use super::quality::{self, Reconstructed, reconstruct};
+use super::{Evaluation, Report};
+use crate::Result;
+use crate::data::Item;
+use crate::eval::codec::Codec;
+use crate::eval::figure::{HEAT_RANGE, Sheet, display, heat};
+use crate::eval::table::{Cell, Table};
+
+/// Table 1: means per codec; table 2: every panorama; a sheet per system: target, reconstructions, their errors.
+///
+/// # Errors
+/// As coding, decoding and writing fail.
+pub fn run(run: &Evaluation<'_>) -> Result<Report> {
+    let mut report = Report::default();
+    let columns = |first: &[&'static str]| [first, &quality::COLUMNS].concat();
+    let mut means = Table::new("reconstruction", "Reconstruction", &columns(&["System", "Pass", "D"]));
+    let mut each = Table::new(
+        "reconstruction-images",
+        "Reconstruction of each panorama",
+        &columns(&["Panorama", "System"]),
+    );
+    for subject in run.subjects {
+        let codecs = run.codecs(subject);
+        let codecs: Vec<&dyn Codec> = codecs.iter().map(|codec| &**codec).collect();
+        system(run, subject.name(), &codecs, [&mut means, &mut each], &mut report)?;
+    }
+    for codec in run.others {
+        system(run, codec.system(), &[*codec], [&mut means, &mut each], &mut report)?;
+    }
+    means.note(quality::NOTE);
+    means.note(run.optimised_note());
+    (report.tables, report.details) = (vec![means], vec![each]);
+    Ok(report)
+}
+
+/// Rows and a sheet of one system.
+fn system(
+    run: &Evaluation<'_>,
+    name: &str,
+    codecs: &[&dyn Codec],
+    [means, each]: [&mut Table; 2],
+    report: &mut Report,
+) -> Result<()> {
+    let mut results = Vec::new();
+    for codec in codecs {
+        let result = reconstruct(run, *codec)?;
+        let first =
+            [Cell::text(codec.system()), Cell::text(codec.pass()), Cell::Number(codec.dimension() as f64, 0)];
+        means.push(first.into_iter().chain(result.mean.cells()).collect());
+        for (item, quality) in run.data.items().iter().zip(&result.each) {
+            let label = format!("{}, {}", codec.system(), codec.pass());
+            each.push(
+                [Cell::text(item.name()), Cell::text(label)].into_iter().chain(quality.cells()).collect(),
+            );
+        }
+        results.push((codec.pass(), result));
+    }
+    run.sheet(&format!("reconstruction-{name}"), &sheet(run, &results), report)
+}
+
+fn sheet(run: &Evaluation<'_>, results: &[(&str, Reconstructed)]) -> Sheet {
+    let (grid, items) = (run.data.grid(), run.data.items());
+    let titles =
+        results.iter().flat_map(|(pass, _)| [(*pass).to_owned(), format!("error, 0 to {HEAT_RANGE}")]);
+    let titles: Vec<_> = std::iter::once("panorama".to_owned()).chain(titles).collect();
+    let names: Vec<_> = items.iter().map(Item::name).collect();
+    let mut sheet = Sheet::new(grid, &titles, &names);
+    for (row, item) in items.iter().enumerate() {
+        sheet.place(0, row, &display(grid, &item.log_radiance));
+        for (at, (_, result)) in results.iter().enumerate() {
+            let image = &result.images[row];
+            sheet.place(1 + 2 * at, row, &display(grid, image));
+            sheet.place(2 + 2 * at, row, &heat(image, &item.log_radiance));
+        }
+    }
+    sheet
+}
