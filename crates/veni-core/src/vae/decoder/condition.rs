@@ -5,6 +5,7 @@ use crate::nn::uniform;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 /// The Vector-Neuron invariant of each latent vector.
 ///
@@ -45,7 +46,23 @@ impl Condition {
             (0..n).map(|_| rand::RngExt::random_range(rng, -bound..bound)).collect()
         };
         let (c, bound) = (channels, (channels as f32).recip().sqrt());
-        let (linear, w, mut u) = (draw(c, 1.0), draw(c * c, bound), draw(c * c, bound));
+        let weights = [draw(c, 1.0), draw(c * c, bound), draw(c * c, bound)];
+        Self::of(form, uniform([1], 1.0, rng, device), weights, device)
+    }
+
+    /// The same with weights from N(0, 1), as in RENI++.
+    pub fn standard_normal(form: VnReluForm, channels: usize, rng: &mut impl Rng, device: &Device) -> Self {
+        let mut draw = |n: usize| -> Vec<f32> { (0..n).map(|_| StandardNormal.sample(rng)).collect() };
+        let c = channels;
+        let (weights, scale) = ([draw(c), draw(c * c), draw(c * c)], draw(1));
+        let scale = Param::from_data(TensorData::new(scale, [1]), device);
+        Self::of(form, scale, weights, device)
+    }
+
+    /// From the values of a₀, W and U, which are made alive.
+    fn of(form: VnReluForm, scale: Param<Tensor<1>>, weights: [Vec<f32>; 3], device: &Device) -> Self {
+        let [linear, w, mut u] = weights;
+        let c = linear.len();
         if form == VnReluForm::Projection {
             for e in 0..c {
                 let through = |m: &[f32]| (0..c).map(|i| linear[i] * m[c * i + e]).sum::<f32>();
@@ -56,13 +73,7 @@ impl Condition {
         }
         let param =
             |values: Vec<f32>, shape: [usize; 2]| Param::from_data(TensorData::new(values, shape), device);
-        Self {
-            scale: uniform([1], 1.0, rng, device),
-            linear: param(linear, [1, c]),
-            w: param(w, [c, c]),
-            u: param(u, [c, c]),
-            form,
-        }
+        Self { scale, linear: param(linear, [1, c]), w: param(w, [c, c]), u: param(u, [c, c]), form }
     }
 
     /// Latents `[B, N, 3]` → `[B, N, 3]`: (a_0, a_1, z_z) of each vector, or (a_0, a_1, a_2).
