@@ -76,6 +76,29 @@ fn a_run_leaves_all_that_is_promised() {
 }
 
 #[test]
+fn an_auto_decoder_is_trained_by_the_same_command() {
+    let dir = Dir::new();
+    let data = text(panoramas());
+    let args = [&train_args(&data, "run", "2")[..13], &["--system", "reni++"]].concat();
+    let [value] = &dir.json(&args)[..] else { panic!("one object") };
+    assert!(value["best"]["ldr_psnr"].as_f64().unwrap().is_finite());
+    assert!(dir.path("run/latents.safetensors").is_file());
+    assert_eq!(steps_done(&dir, "run"), 2);
+    let facts = dir.json(&["inspect", "run/model.safetensors"]).remove(0);
+    assert_eq!(
+        facts["training"]["command"],
+        "veni-cli train --data panoramas --system reni++ --preset tiny --latent-vectors 4 --seed 3 --steps 2 --out run"
+    );
+    dir.ok(&["bake", "--seed", "1", "--model", "run", "--size", "16", "-o", "sky.exr"]);
+    // encoding needs an encoder, which it has not
+    let failed = dir.run(&["encode", "sky.exr", "--model", "run", "-o", "sky.json"]);
+    assert!(failed.code == Some(2) && failed.err.contains("encoder"), "{}", failed.err);
+    // what is begun anew leaves nothing of the old run behind
+    dir.ok(&[&train_args(&data, "run", "1")[..], &["--force"]].concat());
+    assert!(!dir.path("run/latents.safetensors").exists());
+}
+
+#[test]
 fn seeds_decide_everything() {
     let dir = Dir::new();
     let data = text(panoramas());

@@ -1,18 +1,16 @@
-//! The RENI++ field network: attention conditioning, Vector-Neuron invariance, SO(2).
+//! The field networks: the paper's, and those it is compared with.
 //!
 //! Options that our decoder does not have are brought about here: another axis is a permutation of the
-//! coordinates, an output activation follows the decoder, a missing positional encoding is an input map
-//! whose sine rows are zero, and an encoded conditioning goes into wider value maps.
+//! coordinates, and most output activations follow the decoder.
 
 use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared, Outcome::Skipped};
 use burn::tensor::{Device, Gradients, Tensor, activation};
 use rand::SeedableRng;
-use std::f32::consts::TAU;
-use veni::model::{DecoderConfig, VnReluForm};
+use veni::model::{Conditioning, DecoderConfig, Encoding, Equivariance, Invariance, OutputForm, VnReluForm};
 use veni::sphere::Equirect;
 use veni::sphere::reference::decoder_directions;
-use veni::vae::decoder::{Decoder, Linear, rotate};
+use veni::vae::decoder::{Decoder, reni_2022_inputs, rotate};
 use veni::vae::weights::{self, Weight, Weights};
 
 /// See [`Family`](crate::Family).
@@ -30,17 +28,18 @@ pub(crate) fn unsupported(case: &Case) -> Option<String> {
         let value = case.text(key).unwrap_or(ours[0]);
         (!ours.contains(&value)).then(|| format!("{key} = {value}: we build {}", ours.join(", ")))
     };
-    only("conditioning", &["Attention"])
-        .or_else(|| only("equivariance", &["SO2"]))
-        .or_else(|| only("invariant_function", &["VN"]))
+    only("conditioning", &["Attention", "FiLM", "Concat"])
+        .or_else(|| only("equivariance", &["SO2", "SO3", "None"]))
+        .or_else(|| only("invariant_function", &["VN", "GramMatrix"]))
         .or_else(|| only("encoded_input", &["Directions", "Conditioning", "Both", "None"]))
         .or_else(|| only("positional_encoding", &["NeRF", "None"]))
         .or_else(|| only("output_activation", &["None", "sigmoid", "relu", "tanh", "exp"]))
         .or_else(|| only("axis_of_invariance", &["z", "x", "y"]))
-        .or_else(|| {
-            let old = case.config.get("old_implementation").and_then(serde_json::Value::as_bool);
-            (old == Some(true)).then(|| "old_implementation: the RENI 2022 input layout".into())
-        })
+}
+
+/// Whether the inputs come in the order of RENI (2022).
+fn is_reni_2022(case: &Case) -> bool {
+    case.config.get("old_implementation").and_then(serde_json::Value::as_bool) == Some(true)
 }
 
 /// One of the field's parameters: the authors' key and shape, our name, whether ours is transposed.
@@ -51,20 +50,17 @@ struct Binding {
     transposed: bool,
 }
 
-/// What the authors' network has and ours, folded, has not: it must have no effect.
+/// What the authors' network has and ours has not: it must have no effect.
 struct Dead {
     key: String,
 }
 
-/// Sizes of a field, from the configuration.
+/// A field, from the configuration of its case.
 pub(crate) struct Sizes {
     pub(crate) n: usize,
-    pub(crate) hidden: usize,
-    pub(crate) layers: usize,
-    /// Whether the directional input is encoded.
-    encoded: bool,
-    /// Whether the conditioning is.
-    encoded_condition: bool,
+    pub(crate) config: DecoderConfig,
+    /// Which of our inputs each of theirs is, where that is not the same one.
+    inputs: Option<Vec<usize>>,
 }
 
 impl Sizes {
@@ -72,49 +68,124 @@ impl Sizes {
         let size =
             |key: &str| case.size(key).unwrap_or_else(|| panic!("the configuration has no size `{key}`"));
         let nerf = case.text("positional_encoding") != Some("None");
-        let input = case.text("encoded_input").unwrap_or("Directions");
-        Self {
-            n: size("latent_dim"),
+        let conditioning = match case.text("conditioning") {
+            Some("Concat") => Conditioning::Concat,
+            Some("FiLM") => Conditioning::Film,
+            _ => Conditioning::Attention,
+        };
+        let default = DecoderConfig::default();
+        let sine = case.config.get("last_layer_linear").and_then(serde_json::Value::as_bool) == Some(false);
+        let config = DecoderConfig {
             hidden: size("hidden_features"),
-            layers: size("num_attention_layers"),
-            encoded: nerf && ["Directions", "Both"].contains(&input),
-            encoded_condition: nerf && ["Conditioning", "Both"].contains(&input),
-        }
+            layers: match conditioning {
+                Conditioning::Concat => size("hidden_layers"),
+                // their input map counts as one
+                Conditioning::Film => size("hidden_layers") - 1,
+                _ => size("num_attention_layers"),
+            },
+            vn_relu: form(case),
+            conditioning,
+            invariance: match case.text("invariant_function") {
+                Some("GramMatrix") => Invariance::GramMatrix,
+                _ => Invariance::Vn,
+            },
+            equivariance: match case.text("equivariance") {
+                Some("SO3") => Equivariance::So3,
+                Some("None") => Equivariance::None,
+                _ => Equivariance::So2,
+            },
+            encoding: match case.text("encoded_input").unwrap_or("Directions") {
+                "Directions" if nerf => Encoding::Directions,
+                "Conditioning" if nerf => Encoding::Condition,
+                "Both" if nerf => Encoding::Both,
+                _ => Encoding::None,
+            },
+            output: match case.text("output_activation") {
+                Some("tanh") => OutputForm::Tanh,
+                _ if sine && conditioning == Conditioning::Concat => OutputForm::Sine,
+                _ => OutputForm::Linear,
+            },
+            mapping_layers: case.size("mapping_layers").unwrap_or(default.mapping_layers),
+            mapping_features: case.size("mapping_features").unwrap_or(default.mapping_features),
+            ..default
+        };
+        let n = size("latent_dim");
+        let old = || reni_2022_inputs(&config, n).expect("RENI (2022) has this network");
+        Self { n, inputs: is_reni_2022(case).then(old), config }
     }
 
     fn bindings(&self) -> (Vec<Binding>, Vec<Dead>) {
-        let (h, c) = (self.hidden, self.condition());
-        let inputs = (self.n + 2) * if self.encoded { 5 } else { 1 };
+        let (n, h, layers) = (self.n, self.config.hidden, self.config.layers);
+        let (directional, told) = (self.config.direction_inputs(n), self.config.condition_inputs(n));
         let (mut all, mut dead) = (Vec::new(), Vec::new());
-        let mut put = |key: String, shape: Vec<usize>, ours: String, transposed: bool| {
-            all.push(Binding { key, shape, ours, transposed });
-        };
-        put("vn_proj_in.1.weight".into(), vec![1, 1], "condition.scale".into(), false);
-        put("vn_invar.mlp.0.weight".into(), vec![2, 1], "condition.linear".into(), true);
-        put("vn_invar.mlp.1.W".into(), vec![2, 2], "condition.w".into(), true);
-        put("vn_invar.mlp.1.U".into(), vec![2, 2], "condition.u".into(), true);
-        let mut linear = |key: String, ours: String, from: usize, to: usize| {
-            put(format!("{key}.weight"), vec![to, from], format!("{ours}.weight"), true);
-            put(format!("{key}.bias"), vec![to], format!("{ours}.bias"), false);
-        };
-        linear("network.residual_projection".into(), "input".into(), inputs, h);
-        linear("network.fc".into(), "output".into(), h, 3);
-        for l in 0..self.layers {
-            let (theirs, ours) = (format!("network.layers.{l}"), format!("layers.{l}"));
-            linear(format!("{theirs}.mha.value"), format!("{ours}.value"), c, h);
-            linear(format!("{theirs}.mha.fc_out"), format!("{ours}.out"), h, h);
-            linear(format!("{theirs}.fc.0"), format!("{ours}.ff1"), h, h);
-            linear(format!("{theirs}.fc.2"), format!("{ours}.ff2"), h, h);
+        let vn = [
+            ("vn_proj_in.1.weight", "scale", [1, 1], false),
+            ("vn_invar.mlp.0.weight", "linear", [0, 1], true),
+            ("vn_invar.mlp.1.W", "w", [0, 0], true),
+            ("vn_invar.mlp.1.U", "u", [0, 0], true),
+        ];
+        for (key, ours, shape, transposed) in vn {
+            let Some(c) = self.config.vn_channels() else {
+                dead.push(Dead { key: key.into() });
+                continue;
+            };
+            let shape = shape.iter().map(|s| if *s == 0 { c } else { *s }).collect();
+            all.push(Binding { key: key.into(), shape, ours: format!("condition.{ours}"), transposed });
         }
-        for l in 0..self.layers {
-            for norm in ["norm1", "norm2"] {
-                for (theirs, ours) in [("weight", "gamma"), ("bias", "beta")] {
-                    let key = format!("network.layers.{l}.{norm}.{theirs}");
-                    put(key, vec![h], format!("layers.{l}.{norm}.{ours}"), false);
+        let mut linear = |key: String, ours: String, from: usize, to: usize| {
+            let (weight, bias) = (format!("{ours}.weight"), format!("{ours}.bias"));
+            let shape = vec![to, from];
+            all.push(Binding { key: format!("network.{key}.weight"), shape, ours: weight, transposed: true });
+            let shape = vec![to];
+            all.push(Binding { key: format!("network.{key}.bias"), shape, ours: bias, transposed: false });
+        };
+        match self.config.conditioning {
+            Conditioning::Concat => {
+                linear("net.0.linear".into(), "input".into(), directional + told, h);
+                for l in 0..layers {
+                    linear(format!("net.{}.linear", l + 1), format!("layers.{l}"), h, h);
                 }
+                let last = if self.config.output == OutputForm::Sine { ".linear" } else { "" };
+                linear(format!("net.{}{last}", layers + 1), "output".into(), h, 3);
             }
-            for part in ["query.weight", "query.bias", "key.weight", "key.bias"] {
-                dead.push(Dead { key: format!("network.layers.{l}.mha.{part}") });
+            Conditioning::Film => {
+                let (count, width) = (self.config.mapping_layers, self.config.mapping_features);
+                for k in 0..=count {
+                    let (from, to) = (
+                        if k == 0 { told } else { width },
+                        if k == count { 2 * h * (layers + 1) } else { width },
+                    );
+                    let key = format!("mapping_network.network.{}", 2 * k);
+                    linear(key, format!("mapping.{k}"), from, to);
+                }
+                linear("net.0.layer".into(), "input".into(), directional, h);
+                for l in 0..layers {
+                    linear(format!("net.{}.layer", l + 1), format!("layers.{l}"), h, h);
+                }
+                linear("final_layer".into(), "output".into(), h, 3);
+            }
+            _ => {
+                linear("residual_projection".into(), "input".into(), directional, h);
+                linear("fc".into(), "output".into(), h, 3);
+                for l in 0..layers {
+                    let (theirs, ours) = (format!("layers.{l}"), format!("layers.{l}"));
+                    linear(format!("{theirs}.mha.value"), format!("{ours}.value"), told, h);
+                    linear(format!("{theirs}.mha.fc_out"), format!("{ours}.out"), h, h);
+                    linear(format!("{theirs}.fc.0"), format!("{ours}.ff1"), h, h);
+                    linear(format!("{theirs}.fc.2"), format!("{ours}.ff2"), h, h);
+                }
+                for l in 0..layers {
+                    for norm in ["norm1", "norm2"] {
+                        for (theirs, ours) in [("weight", "gamma"), ("bias", "beta")] {
+                            let key = format!("network.layers.{l}.{norm}.{theirs}");
+                            let ours = format!("layers.{l}.{norm}.{ours}");
+                            all.push(Binding { key, shape: vec![h], ours, transposed: false });
+                        }
+                    }
+                    for part in ["query.weight", "query.bias", "key.weight", "key.bias"] {
+                        dead.push(Dead { key: format!("network.layers.{l}.mha.{part}") });
+                    }
+                }
             }
         }
         (all, dead)
@@ -125,15 +196,18 @@ impl Sizes {
         self.bindings().1.into_iter().map(|dead| format!("{prefix}{}", dead.key)).collect()
     }
 
-    /// Width of what the value maps read.
-    fn condition(&self) -> usize {
-        3 * self.n * if self.encoded_condition { 5 } else { 1 }
-    }
-
-    /// Rows of our input map that the authors' one has.
-    fn used_rows(&self) -> std::ops::Range<usize> {
-        let m = self.n + 2;
-        if self.encoded { 0..5 * m } else { 4 * m..5 * m }
+    /// Our rows of a map in the authors' order, or theirs in ours: one row per input.
+    fn reorder(&self, binding: &Binding, values: Vec<f32>, to_ours: bool) -> Vec<f32> {
+        let Some(inputs) = self.inputs.as_ref().filter(|_| binding.ours == "input.weight") else {
+            return values;
+        };
+        let h = self.config.hidden;
+        let mut out = vec![0.0; values.len()];
+        for (theirs, ours) in inputs.iter().enumerate() {
+            let (from, to) = if to_ours { (theirs, *ours) } else { (*ours, theirs) };
+            out[to * h..(to + 1) * h].copy_from_slice(&values[from * h..(from + 1) * h]);
+        }
+        out
     }
 }
 
@@ -145,15 +219,8 @@ pub(crate) fn form(case: &Case) -> VnReluForm {
 /// The authors' decoder with its weights, from `case` (parameters under `prefix` in front of each key).
 pub(crate) fn build(case: &Case, prefix: &str, device: &Device) -> Decoder {
     let sizes = Sizes::of(case);
-    let mut config = DecoderConfig { hidden: sizes.hidden, layers: sizes.layers, ..DecoderConfig::default() };
-    config.vn_relu = form(case);
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0);
-    let mut decoder = Decoder::new(&config, sizes.n, &mut rng, device);
-    if sizes.encoded_condition {
-        for layer in &mut decoder.layers {
-            layer.value = Linear::new(sizes.condition(), sizes.hidden, &mut rng, device);
-        }
-    }
+    let decoder = Decoder::new(&sizes.config, sizes.n, &mut rng, device);
     let mut ours = weights::read(&decoder, "");
     for binding in sizes.bindings().0 {
         let key = format!("{prefix}{}", binding.key);
@@ -162,13 +229,7 @@ pub(crate) fn build(case: &Case, prefix: &str, device: &Device) -> Decoder {
         let theirs = if binding.transposed { theirs.transposed() } else { theirs };
         let slot =
             ours.get_mut(&binding.ours).unwrap_or_else(|| panic!("our decoder has no {}", binding.ours));
-        if binding.ours == "input.weight" {
-            slot.data.fill(0.0);
-            let rows = sizes.used_rows();
-            slot.data[rows.start * sizes.hidden..rows.end * sizes.hidden].copy_from_slice(&theirs.values);
-        } else {
-            slot.data = theirs.values;
-        }
+        slot.data = sizes.reorder(&binding, theirs.values, true);
     }
     weights::write(decoder, "", &ours).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -190,10 +251,7 @@ pub(crate) fn compare_records(case: &Case, sizes: &Sizes, record: &str, ours: &W
         }
         let zero = || Weight { shape: vec![], data: vec![0.0; binding.shape.iter().product()] };
         let mut values = ours.get(&binding.ours).cloned().unwrap_or_else(zero);
-        if binding.ours == "input.weight" {
-            let rows = sizes.used_rows();
-            values.data = values.data[rows.start * sizes.hidden..rows.end * sizes.hidden].to_vec();
-        }
+        values.data = sizes.reorder(&binding, values.data, false);
         let mut shape = binding.shape.clone();
         if binding.transposed {
             shape.reverse();
@@ -211,16 +269,9 @@ pub(crate) fn compare_records(case: &Case, sizes: &Sizes, record: &str, ours: &W
 
 /// Log radiance [B, R, 3] for latents and directions in the authors' axes, before the output activation.
 fn decode(case: &Case, decoder: &Decoder, latent: Tensor<3>, directions: Tensor<2>) -> Tensor<3> {
-    let (latent, directions) = (to_our_axis(case, latent), to_our_axis(case, directions));
-    if !Sizes::of(case).encoded_condition {
-        return decoder.forward(latent, directions);
-    }
-    let x = decoder.condition.forward(latent.clone());
-    let [batch, width] = x.dims();
-    let frequencies = Tensor::<3>::from_floats([[[1.0, 4.0]]], &x.device()) * TAU;
-    let turns = (x.clone().unsqueeze_dim::<3>(2) * frequencies).reshape([batch, 2 * width]);
-    let condition = Tensor::cat(vec![turns.clone().sin(), turns.cos(), x], 1);
-    decoder.forward_conditioned(latent, condition, directions.unsqueeze())
+    // RENI (2022) inside RENI++ swaps the directions' y and z, which have their axis z then
+    let directions = if is_reni_2022(case) { directions } else { to_our_axis(case, directions) };
+    decoder.forward(to_our_axis(case, latent), directions)
 }
 
 /// Coordinates so that the equivariant pair comes first and the axis last: their axis becomes our z.
@@ -237,7 +288,11 @@ fn activate(case: &Case, x: Tensor<3>) -> Tensor<3> {
     match case.text("output_activation") {
         Some("sigmoid") => activation::sigmoid(x),
         Some("relu") => activation::relu(x),
-        Some("tanh") => activation::tanh(x),
+        // their output is the tanh itself, ours its de-normalised value
+        Some("tanh") => {
+            let [least, most] = OutputForm::TANH_RANGE;
+            (x - least) * (2.0 / (most - least)) - 1.0
+        }
         Some("exp") => x.exp(),
         _ => x,
     }
@@ -245,7 +300,8 @@ fn activate(case: &Case, x: Tensor<3>) -> Tensor<3> {
 
 /// The case that holds the weights, if it is not `case` itself; the error says why there is none.
 pub(crate) fn companion(case: &Case) -> Result<Option<Case>, String> {
-    if case.get("param.network.fc.bias").is_some() || case.config.get("filler_seed").is_some() {
+    let own = ["fc", "final_layer", "net.0.linear"].map(|map| format!("param.network.{map}.bias"));
+    if own.iter().any(|bias| case.get(bias).is_some()) || case.config.get("filler_seed").is_some() {
         return Ok(None);
     }
     let note = case.text("note").unwrap_or_default();

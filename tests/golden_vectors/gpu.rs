@@ -9,30 +9,27 @@ use veni::gpu::adapters::{self, Opened};
 use veni::gpu::wgpu::{BufferDescriptor, BufferUsages, CommandEncoderDescriptor};
 use veni::gpu::{Bake, GpuDecoder, read_back};
 use veni::latent::Latent;
-use veni::model::{DecoderConfig, Model, ModelConfig, ModelInfo};
+use veni::model::{Model, ModelConfig, ModelInfo};
 use veni::vae::decoder::rotate;
 use veni::vae::weights;
 
-/// Why the decoder of a model file cannot be this field, if it cannot; burn's can be more.
+/// Why the decoder of a model file cannot be this field on the GPU, if it cannot; burn's can be more.
 fn unsupported(case: &Case) -> Option<String> {
     let only = |key: &str, ours: &str| {
         let value = case.text(key).unwrap_or(ours);
         (value != ours).then(|| format!("{key} = {value}: the GPU decoder has {ours}"))
     };
     field::unsupported(case)
-        .or_else(|| only("encoded_input", "Directions"))
-        .or_else(|| only("positional_encoding", "NeRF"))
+        .or_else(|| Sizes::of(case).config.check_folds().err().map(|e| e.to_string()))
         .or_else(|| only("output_activation", "None"))
         .or_else(|| only("axis_of_invariance", "z"))
 }
 
 /// The case's decoder as a model.
-fn model(case: &Case, source: &Case) -> Model {
+fn model(source: &Case) -> Model {
     let decoder = field::build(source, "", &Device::flex());
-    let sizes = Sizes::of(source);
-    let config = DecoderConfig { hidden: sizes.hidden, layers: sizes.layers, ..DecoderConfig::default() };
-    let config = DecoderConfig { vn_relu: field::form(case), ..config };
-    let config = ModelConfig { decoder: config, ..ModelConfig::decode_only(sizes.n) };
+    let Sizes { n, config, .. } = Sizes::of(source);
+    let config = ModelConfig { decoder: config, ..ModelConfig::decode_only(n) };
     let tensors: BTreeMap<_, _> = weights::read(&decoder, "decoder")
         .into_iter()
         .map(|(name, w)| (name, veni::model::Tensor { shape: w.shape, data: w.data }))
@@ -73,7 +70,7 @@ fn run(case: &Case, gpu: &Opened, shift: f32) -> Option<Verdict> {
         Err(reason) => return Some(Verdict::Skipped(reason)),
     };
     let device = Device::flex();
-    let model = model(case, companion.as_ref().unwrap_or(case));
+    let model = model(companion.as_ref().unwrap_or(case));
     let latent: Tensor<3> = case.tensor("in.latent", &device);
     let latent = match case.get("in.rotation") {
         Some(rotation) => rotate(latent, rotation.tensor([3, 3], &device)),

@@ -32,11 +32,11 @@ fn training_step(criterion: &mut Criterion) {
         let device = config.device.device().expect("the flex device").autodiff();
         let weights = &mut stream(0, Purpose::Weights, 0, 0);
         let mut veni = Some(Veni::new(&config.model, weights, &device).expect("a valid size"));
-        let groups = [("decoder", &config.decoder), ("encoder", &config.encoder)];
+        let groups = config.groups().into_iter();
         let groups = groups.map(|(prefix, group)| Group { prefix: prefix.into(), adam: group.adam });
         let model = veni.as_ref().expect("just made");
         let mut optimiser =
-            Optimiser::new(model, groups.into(), config.ema_decay).expect("groups of this model");
+            Optimiser::new(model, groups.collect(), config.ema_decay).expect("groups of this model");
         let batches = Batches::new(&config, model.stripes().expect("a valid size"), &splits.train);
         let [height, width] =
             [config.data.height, config.data.width].map(|side| side / config.loss_grid.factor());

@@ -57,9 +57,9 @@ fn main() -> Result<()> {
     let splits = Splits::open(&config.data, config.seed)?;
     let device = config.device.device()?.autodiff();
     let mut veni = Veni::new(&config.model, &mut stream(0, Purpose::Weights, 0, 0), &device)?;
-    let groups = [("decoder", &config.decoder), ("encoder", &config.encoder)];
+    let groups = config.groups().into_iter();
     let groups = groups.map(|(prefix, g)| Group { prefix: prefix.into(), adam: g.adam });
-    let mut optimiser = Optimiser::new(&veni, groups.into(), config.ema_decay)?;
+    let mut optimiser = Optimiser::new(&veni, groups.collect(), config.ema_decay)?;
     let batches = Batches::new(&config, veni.stripes()?, &splits.train);
     let [height, width] = [config.data.height, config.data.width].map(|n| n / config.loss_grid.factor());
     let loss = Loss::new(&config.loss, height, width, &device);
@@ -71,7 +71,7 @@ fn main() -> Result<()> {
         let total = clock
             .time("whole step: forward", counts, || batch_loss(&veni, &batch, &loss, &device).terms.total());
         let gradients = clock.time("whole step: backward", counts, || total.backward());
-        let rates = [&config.decoder, &config.encoder].map(|g| g.learning_rate.at(step));
+        let rates = config.groups().into_iter().map(|(_, g)| g.learning_rate.at(step)).collect::<Vec<_>>();
         (veni, _) = clock
             .time("whole step: Adam, clipping, average", counts, || optimiser.step(veni, &gradients, &rates));
 

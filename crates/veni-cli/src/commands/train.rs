@@ -24,7 +24,7 @@ use crate::report::{Outcome, Report, to_stderr};
 use watch::Watch;
 
 /// What a run writes into its folder.
-const FILES: [&str; 3] = ["config.toml", "metrics.jsonl", "model.safetensors"];
+const FILES: [&str; 4] = ["config.toml", "metrics.jsonl", "model.safetensors", "latents.safetensors"];
 const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
 
 /// Train a model on HDR panoramas
@@ -34,12 +34,14 @@ const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
         DIR holds equirectangular OpenEXR or Radiance files. If it has the folders train/ and val/, they are used \
         as such; otherwise a tenth of the files, chosen by seed, validates. RUN receives config.toml (everything \
         that defines the run), metrics.jsonl (one line per step and validation), preview/*.png (target | \
-        reconstruction | random sample), checkpoint/ and model.safetensors, the weights that validated best.\n\n\
+        reconstruction | random sample), checkpoint/ and model.safetensors, the weights that validated best; with \
+        --system reni++ also latents.safetensors, the latents of the training panoramas.\n\n\
         Ctrl-C writes a checkpoint and ends; a second one ends at once. A run that was stopped or killed continues \
         with --resume from its last checkpoint as if nothing had happened, to the bit on the same machine.",
     after_help = "Examples:\n  \
         veni-cli train --data assets/panoramas --preset tiny --out runs/try\n  \
         veni-cli train --data hdri --preset small --latent-vectors 9 --seed 1 --out runs/small\n  \
+        veni-cli train --data hdri --system reni++ --preset small --out runs/reni\n  \
         veni-cli train --resume --out runs/small\n  \
         veni-cli train --data hdri --out runs/kld --set loss.kld=0.001 --set batch=8\n  \
         veni-cli train --config runs/small/config.toml --seed 2 --out runs/second"
@@ -52,6 +54,10 @@ pub(crate) struct Train {
     /// Folder of the run
     #[arg(long, short, value_name = "RUN")]
     out: PathBuf,
+
+    /// What is trained [default: veni]
+    #[arg(long, value_enum, conflicts_with = "config")]
+    system: Option<SystemName>,
 
     /// Starting point for all settings [default: small]
     #[arg(long, value_enum, conflicts_with = "config")]
@@ -88,6 +94,17 @@ pub(crate) struct Train {
     /// Begin anew in place of the run in RUN, once the data is known to be good
     #[arg(long, short)]
     force: bool,
+}
+
+/// The systems by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SystemName {
+    /// The auto-encoder of the article
+    #[default]
+    Veni,
+    /// The auto-decoder that it is compared with: no encoder, a latent for each training panorama
+    #[value(name = "reni++")]
+    Reni,
 }
 
 /// The presets by name.

@@ -80,8 +80,10 @@ impl Model {
     /// The decoder of this model, packed for evaluation (about a millisecond). Keep it for many latents.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] if the network is none that folds into a residual perceptron.
+    /// [`Error::Unsupported`] if the network is not the paper's; see
+    /// [`check_folds`](crate::model::DecoderConfig::check_folds).
     pub fn decoder(&self) -> Result<Decoder> {
+        self.config().decoder.check_folds()?;
         Ok(Decoder { weights: Arc::new(Weights::new(self)) })
     }
 }

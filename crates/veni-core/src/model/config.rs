@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::DecoderConfig;
 use crate::{Error, Result};
 
 /// Everything needed to build a model's modules and to check its weight file.
@@ -31,11 +32,8 @@ impl ModelConfig {
     /// # Errors
     /// [`Error::Invalid`] naming the field, its value and what is allowed.
     pub fn validate(&self) -> Result<()> {
-        let DecoderConfig { hidden, layers, heads, vn_relu: _ } = self.decoder;
         within("latent_vectors", self.latent_vectors, 4096)?;
-        within("decoder.hidden", hidden, 8192)?;
-        within("decoder.layers", layers, 256)?;
-        within("decoder.heads", heads, hidden)?;
+        self.decoder.validate()?;
         let Some(encoder) = &self.encoder else { return Ok(()) };
         within("encoder.stripes", encoder.stripes, 1 << 16)?;
         within("encoder.samples", encoder.samples.unwrap_or(1), 1 << 20)?;
@@ -47,7 +45,7 @@ impl ModelConfig {
     }
 }
 
-fn within(name: &str, value: usize, most: usize) -> Result<()> {
+pub(super) fn within(name: &str, value: usize, most: usize) -> Result<()> {
     if (1..=most).contains(&value) {
         return Ok(());
     }
@@ -62,26 +60,6 @@ pub enum ModelKind {
     Veni,
     /// RENI++ auto-decoder.
     Reni,
-}
-
-/// The RENI++ field network: attention conditioning, VN invariance, SO(2) about z.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct DecoderConfig {
-    /// Width of the residual MLP.
-    pub hidden: usize,
-    /// Number of residual layers.
-    pub layers: usize,
-    /// Heads of the (one-key) attention. They change nothing that is computed; kept for export.
-    pub heads: usize,
-    /// Form of the VN-ReLU in the conditioning.
-    pub vn_relu: VnReluForm,
-}
-
-impl Default for DecoderConfig {
-    fn default() -> Self {
-        Self { hidden: 128, layers: 6, heads: 8, vn_relu: VnReluForm::Projection }
-    }
 }
 
 /// What the VN-ReLU subtracts when ⟨q, k⟩ < 0 (the Vector-Neuron paper against the authors' program).

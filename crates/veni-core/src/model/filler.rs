@@ -1,6 +1,6 @@
 //! Weights from a formula: for benches, tests and documentation that need a decoder but no asset.
 
-use super::{Model, ModelConfig, ModelInfo, Tensor, decoder_schema};
+use super::{Conditioning, Model, ModelConfig, ModelInfo, Tensor, decoder_schema};
 use crate::Result;
 
 impl Model {
@@ -16,7 +16,7 @@ impl Model {
         config.validate()?;
         let config = ModelConfig { encoder: None, ..config.clone() };
         let tensors = decoder_schema(&config).into_iter().map(|(name, shape)| {
-            let data = fill(&official_key(&name), &shape, seed);
+            let data = fill(&official_key(&name, &config), &shape, seed);
             (name, Tensor { shape, data })
         });
         let tensors = tensors.collect();
@@ -24,8 +24,8 @@ impl Model {
     }
 }
 
-/// The authors' name of a decoder tensor.
-fn official_key(name: &str) -> String {
+/// The authors' name of a decoder tensor. They have no tokens; those have the names of the attention.
+fn official_key(name: &str, config: &ModelConfig) -> String {
     let name = name.strip_prefix("decoder.").unwrap_or(name);
     match name {
         "condition.scale" => return "vn_proj_in.1.weight".into(),
@@ -34,18 +34,42 @@ fn official_key(name: &str) -> String {
         "condition.u" => return "vn_invar.mlp.1.U".into(),
         _ => {}
     }
-    let pairs = [
-        ("input.", "residual_projection."),
-        ("output.", "fc."),
-        (".value.", ".mha.value."),
-        (".out.", ".mha.fc_out."),
-        (".ff1.", ".fc.0."),
-        (".ff2.", ".fc.2."),
-        (".gamma", ".weight"),
-        (".beta", ".bias"),
-    ];
-    let renamed = pairs.iter().fold(name.to_owned(), |name, (ours, theirs)| name.replace(ours, theirs));
+    let layers = config.decoder.layers;
+    let renamed = match config.decoder.conditioning {
+        Conditioning::Concat => sine_key(name, "linear", &format!("net.{}", layers + 1)),
+        Conditioning::Film => sine_key(name, "layer", "final_layer"),
+        Conditioning::Attention | Conditioning::Tokens => {
+            let pairs = [
+                ("input.", "residual_projection."),
+                ("output.", "fc."),
+                (".query.", ".mha.query."),
+                (".key.", ".mha.key."),
+                (".value.", ".mha.value."),
+                (".out.", ".mha.fc_out."),
+                (".ff1.", ".fc.0."),
+                (".ff2.", ".fc.2."),
+                (".gamma", ".weight"),
+                (".beta", ".bias"),
+            ];
+            pairs.iter().fold(name.to_owned(), |name, (ours, theirs)| name.replace(ours, theirs))
+        }
+    };
     format!("network.{renamed}")
+}
+
+/// The same in a network of sines, whose input map is layer 0 and whose maps are called `map`.
+fn sine_key(name: &str, map: &str, output: &str) -> String {
+    let parts: Vec<_> = name.split('.').collect();
+    match parts[..] {
+        ["input", part] => format!("net.0.{map}.{part}"),
+        ["output", part] => format!("{output}.{part}"),
+        ["layers", l, part] => format!("net.{}.{map}.{part}", l.parse::<usize>().map_or(0, |l| l + 1)),
+        ["mapping", k, part] => {
+            // a ReLU between two maps has a number of its own
+            format!("mapping_network.network.{}.{part}", k.parse::<usize>().map_or(0, |k| 2 * k))
+        }
+        _ => name.to_owned(),
+    }
 }
 
 /// `shape` is ours: [in, out] for matrices, which the formula sees as [out, in].
@@ -102,11 +126,21 @@ mod tests {
 
     #[test]
     fn keys_are_the_authors() {
-        let key = |name: &str| official_key(&format!("decoder.{name}"));
-        assert_eq!(key("input.weight"), "network.residual_projection.weight");
-        assert_eq!(key("layers.5.out.bias"), "network.layers.5.mha.fc_out.bias");
-        assert_eq!(key("layers.0.norm1.gamma"), "network.layers.0.norm1.weight");
-        assert_eq!(key("layers.3.ff2.weight"), "network.layers.3.fc.2.weight");
-        assert_eq!(key("output.bias"), "network.fc.bias");
+        let mut config = ModelConfig::decode_only(5);
+        let key = |name: &str, config: &ModelConfig| official_key(&format!("decoder.{name}"), config);
+        assert_eq!(key("input.weight", &config), "network.residual_projection.weight");
+        assert_eq!(key("layers.5.out.bias", &config), "network.layers.5.mha.fc_out.bias");
+        assert_eq!(key("layers.0.norm1.gamma", &config), "network.layers.0.norm1.weight");
+        assert_eq!(key("layers.3.ff2.weight", &config), "network.layers.3.fc.2.weight");
+        assert_eq!(key("output.bias", &config), "network.fc.bias");
+        config.decoder.layers = 2;
+        config.decoder.conditioning = Conditioning::Concat;
+        assert_eq!(key("input.weight", &config), "network.net.0.linear.weight");
+        assert_eq!(key("layers.1.bias", &config), "network.net.2.linear.bias");
+        assert_eq!(key("output.bias", &config), "network.net.3.bias");
+        config.decoder.conditioning = Conditioning::Film;
+        assert_eq!(key("layers.0.bias", &config), "network.net.1.layer.bias");
+        assert_eq!(key("mapping.2.weight", &config), "network.mapping_network.network.4.weight");
+        assert_eq!(key("output.weight", &config), "network.final_layer.weight");
     }
 }

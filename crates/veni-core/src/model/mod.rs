@@ -8,6 +8,7 @@
 //! A [`Model`] in memory has passed all checks, so what is built from it cannot fail.
 
 mod config;
+mod decoder;
 mod file;
 mod filler;
 mod header;
@@ -19,12 +20,14 @@ use std::collections::BTreeMap;
 use sha2::{Digest, Sha256};
 
 pub use config::{
-    DecoderConfig, EncoderConfig, ModelConfig, ModelKind, Pooling, Reduction, StripeSampling, VectorLayer,
-    VnReluForm,
+    EncoderConfig, ModelConfig, ModelKind, Pooling, Reduction, StripeSampling, VectorLayer, VnReluForm,
 };
+pub use decoder::{Conditioning, DecoderConfig, Encoding, Equivariance, Invariance, OutputForm};
 pub use file::{MAX_FILE_BYTES, StoredType};
 pub use header::{FORMAT, ModelInfo, Training};
 pub use schema::decoder_schema;
+#[cfg(feature = "learn")]
+pub(crate) use schema::mapping_sizes;
 
 use crate::{Error, Result};
 

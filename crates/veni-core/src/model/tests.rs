@@ -5,7 +5,13 @@ use crate::latent::{Latent, Prior};
 use crate::output::Overwrite;
 
 fn small() -> Model {
-    let decoder = DecoderConfig { hidden: 16, layers: 2, heads: 4, vn_relu: VnReluForm::Reference };
+    let decoder = DecoderConfig {
+        hidden: 16,
+        layers: 2,
+        heads: 4,
+        vn_relu: VnReluForm::Reference,
+        ..DecoderConfig::default()
+    };
     let info = ModelInfo {
         training: Some(Training { data: "four skies".into(), steps: 9, seed: 42, ..Training::default() }),
         prior: None,
@@ -171,4 +177,40 @@ fn the_embedded_model_decodes() {
     let latent = Latent::from_seed(&model.prior(), 1);
     let radiance = model.decoder().unwrap().condition(&latent).unwrap().radiance([1.0, 0.0, 0.0]);
     assert!(radiance.iter().all(|v| v.is_finite() && *v > 0.0));
+}
+
+#[test]
+fn options_at_their_default_are_not_written() {
+    // what files held before there were options: their hash, and with it every latent, stays valid
+    let written = serde_json::to_string(&DecoderConfig::default()).unwrap();
+    assert_eq!(written, r#"{"hidden":128,"layers":6,"heads":8,"vn_relu":"projection"}"#);
+    let read = |text: &str| serde_json::from_str::<DecoderConfig>(text);
+    assert_eq!(read(&written).unwrap(), DecoderConfig::default());
+    let reni = DecoderConfig::reni_2022();
+    assert_eq!(read(&serde_json::to_string(&reni).unwrap()).unwrap(), reni);
+    assert!(read(r#"{"conditioning":"fim"}"#).unwrap_err().to_string().contains("film"));
+    let wrong = |change: fn(&mut DecoderConfig)| {
+        let mut config = ModelConfig::decode_only(3);
+        change(&mut config.decoder);
+        config.validate().unwrap_err().to_string()
+    };
+    assert!(wrong(|c| c.omega = -1.0).contains("decoder.omega = -1"));
+    let heads = wrong(|c| (c.conditioning, c.heads) = (Conditioning::Tokens, 7));
+    assert!(heads.contains("decoder.heads = 7") && heads.contains("128"), "{heads}");
+}
+
+#[test]
+fn a_network_that_does_not_fold_is_refused_by_name() {
+    let refused = |change: fn(&mut DecoderConfig), name: &str| {
+        let mut config = ModelConfig::decode_only(3);
+        change(&mut config.decoder);
+        let error = Model::filler(&config, 1).unwrap().decoder().unwrap_err();
+        assert!(matches!(error, Error::Unsupported(_)) && error.to_string().contains(name), "{error}");
+    };
+    refused(|c| c.conditioning = Conditioning::Film, "decoder.conditioning = Film");
+    refused(|c| c.conditioning = Conditioning::Tokens, "decoder.conditioning = Tokens");
+    refused(|c| c.invariance = Invariance::GramMatrix, "decoder.invariance = GramMatrix");
+    refused(|c| c.equivariance = Equivariance::So3, "decoder.equivariance = So3");
+    refused(|c| c.encoding = Encoding::Both, "decoder.encoding = Both");
+    refused(|c| c.output = OutputForm::Tanh, "decoder.output = Tanh");
 }

@@ -3,6 +3,7 @@
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 /// A trainable tensor of `shape` with entries U(−bound, bound), in row-major order of the generator's words.
 ///
@@ -19,6 +20,19 @@ pub fn uniform<const D: usize>(
             ((2.0 * unit - 1.0) * bound) as f32
         })
         .collect();
+    Param::from_data(TensorData::new(values, shape), device)
+}
+
+/// A trainable tensor of `shape` with normal entries of this mean and deviation, in row-major order of the draws.
+pub fn normal<const D: usize>(
+    shape: [usize; D],
+    [mean, deviation]: [f64; 2],
+    rng: &mut impl Rng,
+    device: &Device,
+) -> Param<Tensor<D>> {
+    let draw = |rng: &mut _| -> f64 { StandardNormal.sample(rng) };
+    let count = shape.iter().product::<usize>();
+    let values: Vec<f32> = (0..count).map(|_| (mean + deviation * draw(rng)) as f32).collect();
     Param::from_data(TensorData::new(values, shape), device)
 }
 

@@ -3,13 +3,15 @@
 use serde::{Deserialize, Serialize};
 
 use crate::data::{AugmentConfig, DataConfig};
-use crate::model::{ModelConfig, StoredType};
+use crate::model::{ModelConfig, ModelKind, StoredType};
+use crate::train::latents::LatentsConfig;
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
 use crate::train::schedule::LearningRate;
 use crate::{Error, Result};
 
-/// A training run.
+/// A training run. Which system is trained is said by `model.kind`: the auto-encoder VENI, or the auto-decoder
+/// RENI++.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainConfig {
@@ -37,8 +39,12 @@ pub struct TrainConfig {
     pub loss: LossConfig,
     /// Optimiser of the decoder.
     pub decoder: GroupConfig,
-    /// Optimiser of the encoder.
-    pub encoder: GroupConfig,
+    /// Optimiser of the encoder; absent with an auto-decoder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub encoder: Option<GroupConfig>,
+    /// The latent table of an auto-decoder; absent with an auto-encoder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub latents: Option<LatentsConfig>,
     /// Validation, previews, checkpoints.
     pub report: ReportConfig,
 }
@@ -179,7 +185,8 @@ impl TrainConfig {
             let steps = config.steps;
             config = table.try_into().map_err(|e: toml::de::Error| broken(text, &e.message()))?;
             if config.steps != steps {
-                for group in [&mut config.decoder, &mut config.encoder] {
+                let second = config.latents.as_mut().map(|l| &mut l.optimiser).or(config.encoder.as_mut());
+                for group in [Some(&mut config.decoder), second].into_iter().flatten() {
                     match &mut group.learning_rate {
                         LearningRate::Cosine { steps: end, .. }
                         | LearningRate::Exponential { steps: end, .. }
@@ -221,9 +228,7 @@ impl TrainConfig {
     pub fn check(&self) -> Result<()> {
         self.model.validate()?;
         self.augment.check()?;
-        if self.model.encoder.is_none() {
-            return Err(Error::invalid("model.encoder is missing: an auto-encoder is trained"));
-        }
+        self.check_system()?;
         let factor = self.loss_grid.factor();
         let (w, h) = (self.data.width, self.data.height);
         if factor == 0 || !w.is_multiple_of(factor) || !h.is_multiple_of(factor) {
@@ -237,7 +242,7 @@ impl TrainConfig {
         if !(0.0..1.0).contains(&self.ema_decay) {
             return Err(Error::invalid(format!("ema_decay = {}: must lie in 0..1", self.ema_decay)));
         }
-        for (name, group) in [("decoder", &self.decoder), ("encoder", &self.encoder)] {
+        for (name, group) in self.groups() {
             let ends = [0, self.steps / 2, self.steps].map(|step| group.learning_rate.at(step));
             if let Some(rate) = ends.into_iter().find(|rate| !(*rate >= 0.0 && rate.is_finite())) {
                 return Err(Error::invalid(format!(
@@ -246,6 +251,55 @@ impl TrainConfig {
             }
         }
         Ok(())
+    }
+}
+
+impl TrainConfig {
+    /// Parameter groups, by the first part of their parameters' paths: `decoder`, and `encoder` or `latents`.
+    pub fn groups(&self) -> Vec<(&'static str, &GroupConfig)> {
+        let encoder = self.encoder.iter().map(|group| ("encoder", group));
+        let latents = self.latents.iter().map(|latents| ("latents", &latents.optimiser));
+        [("decoder", &self.decoder)].into_iter().chain(encoder).chain(latents).collect()
+    }
+
+    /// What the two systems need, and must not have.
+    fn check_system(&self) -> Result<()> {
+        let missing = |what: &str, system: &str| Err(Error::invalid(format!("{what} is missing: {system}")));
+        let foreign = |what: &str, system: &str| Err(Error::invalid(format!("{what}: {system} has none")));
+        match self.model.kind {
+            ModelKind::Veni => {
+                let system = "an auto-encoder (model.kind = veni) is trained";
+                match (&self.model.encoder, &self.encoder, &self.latents) {
+                    (None, _, _) => missing("model.encoder", system),
+                    (_, None, _) => missing("encoder", system),
+                    (_, _, Some(_)) => foreign("latents", "an auto-encoder (model.kind = veni)"),
+                    (Some(_), Some(_), None) => Ok(()),
+                }
+            }
+            ModelKind::Reni => {
+                let system = "an auto-decoder (model.kind = reni)";
+                match (&self.model.encoder, &self.encoder, &self.latents) {
+                    (Some(_), _, _) => return foreign("model.encoder", system),
+                    (_, Some(_), _) => return foreign("encoder", system),
+                    (_, _, None) => return missing("latents", &format!("{system} is trained")),
+                    (None, None, Some(latents)) => latents.check(self.batch)?,
+                }
+                if !self.loss.mage.is_off() {
+                    return foreign("loss.mage", "a set of rays, which an auto-decoder is trained on,");
+                }
+                if self.loss_grid != LossGrid::Full {
+                    return foreign(
+                        "loss_grid",
+                        "an auto-decoder, which is trained on rays (leave it full),",
+                    );
+                }
+                if self.augment != AugmentConfig::default() {
+                    let system = "an auto-decoder, whose latents belong to the panoramas as they are,";
+                    return foreign("augment", system);
+                }
+                Ok(())
+            }
+        }
     }
 }
 
@@ -283,9 +337,10 @@ mod tests {
     #[test]
     fn presets_survive_their_file() {
         for preset in [Preset::Tiny, Preset::Small, Preset::Paper] {
-            let config = preset.config(9);
-            config.check().unwrap();
-            assert_eq!(TrainConfig::from_toml(&config.to_toml().unwrap()).unwrap(), config);
+            for config in [preset.config(9), preset.auto_decoder(9)] {
+                config.check().unwrap();
+                assert_eq!(TrainConfig::from_toml(&config.to_toml().unwrap()).unwrap(), config);
+            }
         }
     }
 
@@ -323,5 +378,22 @@ mod tests {
         assert!(checked("batch=0").contains("batch = 0"));
         assert!(checked("ema_decay=1.0").contains("ema_decay = 1"));
         assert!(checked("augment.mix=2.0").contains("augment.mix = 2"));
+    }
+    #[test]
+    fn what_belongs_to_the_other_system_is_refused() {
+        let refused = |config: &TrainConfig, text: &[&str]| {
+            config.with_overrides(text).unwrap().check().unwrap_err().to_string()
+        };
+        let reni = Preset::Small.auto_decoder(9);
+        assert!(refused(&reni, &["augment.mirror=0.5"]).contains("augment"));
+        assert!(refused(&reni, &["loss.mage=0.5"]).contains("loss.mage"));
+        assert!(refused(&reni, &["model.kind=veni"]).contains("model.encoder is missing"));
+        assert!(refused(&reni, &["latents.rays=3"]).contains("latents.rays = 3"));
+        assert!(refused(&Preset::Small.config(9), &["model.kind=reni"]).contains("model.encoder"));
+        let mut veni = Preset::Small.config(9);
+        veni.latents.clone_from(&reni.latents);
+        assert!(veni.check().unwrap_err().to_string().contains("latents"));
+        let short = reni.with_overrides(&["steps=500"]).unwrap().latents.unwrap().optimiser.learning_rate;
+        assert_eq!(short.at(500), reni.latents.unwrap().optimiser.learning_rate.at(reni.steps));
     }
 }

@@ -1,15 +1,18 @@
 //! Training: what defines a run ([`config`], [`presets`]), what one update does ([`batch`], [`step`], [`loss`],
-//! [`schedule`], [`optimiser`]), and the loop with its folder ([`run`], [`checkpoint`], [`progress`]).
+//! [`schedule`], [`optimiser`]; of an auto-decoder [`rays`] and [`latents`]), and the loop with its folder ([`run`], [`checkpoint`], [`progress`]).
 
 pub mod batch;
 pub mod checkpoint;
 pub mod config;
+pub mod latents;
 mod log;
 pub mod loss;
+pub mod network;
 pub mod optimiser;
 pub mod presets;
 mod preview;
 pub mod progress;
+pub mod rays;
 pub mod run;
 pub mod schedule;
 pub mod step;

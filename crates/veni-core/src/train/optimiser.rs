@@ -33,6 +33,7 @@ pub struct AdamConfig {
     /// Decoupled weight decay; 0 is plain Adam.
     pub weight_decay: f64,
     /// Largest gradient norm of the group; absent: no clipping.
+    #[serde(default)]
     pub clip: Option<f64>,
 }
 

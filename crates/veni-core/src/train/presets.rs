@@ -1,8 +1,10 @@
 //! Named starting points: `tiny` for tests, `small` for two cores, `paper` for a graphics card.
 
 use crate::data::{AugmentConfig, DataConfig};
+use crate::fit::FitConfig;
 use crate::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 use crate::train::config::{DeviceKind, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig};
+use crate::train::latents::LatentsConfig;
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
 use crate::train::schedule::{LearningRate, WeightSchedule};
@@ -33,12 +35,53 @@ impl std::str::FromStr for Preset {
 }
 
 impl Preset {
-    /// The configuration for N latent vectors, without data folders.
+    /// The auto-encoder VENI for N latent vectors, without data folders.
     pub fn config(self, latent_vectors: usize) -> TrainConfig {
         match self {
             Self::Tiny => tiny(latent_vectors),
             Self::Small => small(latent_vectors),
             Self::Paper => paper(latent_vectors),
+        }
+    }
+
+    /// The auto-decoder RENI++ for N latent vectors, with the decoder of [`config`](Self::config) and without data
+    /// folders. Losses, rates and rays are the authors'; only steps, rays and their validation depend on the preset.
+    pub fn auto_decoder(self, latent_vectors: usize) -> TrainConfig {
+        let veni = self.config(latent_vectors);
+        let (steps, warm_up, batch, rays) = match self {
+            Self::Tiny => (200, 10, 2, 128),
+            Self::Small => (12_000, 200, 8, 4096),
+            Self::Paper => (50_001, 500, 16, 8192),
+        };
+        let fit = FitConfig { steps: if self == Self::Tiny { 20 } else { 200 }, ..FitConfig::thorough() };
+        let off = WeightSchedule::Constant(0.0);
+        let adam = AdamConfig { epsilon: 1e-15, clip: None, ..AdamConfig::default() };
+        let group = || group(1e-3, [warm_up, steps], 0.05, adam);
+        TrainConfig {
+            steps,
+            batch,
+            order: Order::Replacement,
+            ema_decay: 0.0,
+            model: ModelConfig { kind: ModelKind::Reni, encoder: None, ..veni.model },
+            augment: AugmentConfig::default(),
+            loss_grid: LossGrid::Full,
+            loss: LossConfig { mage: off, kld: WeightSchedule::Constant(1e-6), ..LossConfig::reference() },
+            decoder: group(),
+            encoder: None,
+            latents: Some(LatentsConfig {
+                optimiser: group(),
+                rays,
+                free_exposure: false,
+                validation: fit,
+                validation_panoramas: 8,
+                validation_factor: if self == Self::Tiny { 1 } else { 2 },
+            }),
+            report: ReportConfig {
+                validate_every: if self == Self::Tiny { 50 } else { steps / 10 },
+                prior_copies: 0,
+                ..veni.report
+            },
+            ..veni
         }
     }
 }
@@ -106,7 +149,8 @@ fn small(latent_vectors: usize) -> TrainConfig {
             ..LossConfig::default()
         },
         decoder: group(1e-3, [200, steps], 0.01, AdamConfig { weight_decay: 0.01, ..adam }),
-        encoder: group(1e-3, [200, steps], 0.01, adam),
+        encoder: Some(group(1e-3, [200, steps], 0.01, adam)),
+        latents: None,
         report: ReportConfig {
             validate_every: 500,
             preview_every: 1000,
@@ -141,7 +185,7 @@ fn tiny(latent_vectors: usize) -> TrainConfig {
         data: DataConfig { width: 32, height: 16, ..DataConfig::default() },
         loss_grid: LossGrid::Full,
         decoder: group(3e-3, [10, steps], 0.05, AdamConfig::default()),
-        encoder: group(3e-3, [10, steps], 0.05, AdamConfig::default()),
+        encoder: Some(group(3e-3, [10, steps], 0.05, AdamConfig::default())),
         report: ReportConfig {
             validate_every: 50,
             preview_every: 100,
@@ -172,7 +216,7 @@ fn paper(latent_vectors: usize) -> TrainConfig {
         loss_grid: LossGrid::Full,
         loss: LossConfig::default(),
         decoder: group(1e-4, [200, steps], 0.05, AdamConfig::default()),
-        encoder: group(1e-3, [200, steps], 0.05, AdamConfig::default()),
+        encoder: Some(group(1e-3, [200, steps], 0.05, AdamConfig::default())),
         report: ReportConfig {
             validate_every: 1000,
             preview_every: 1000,

@@ -7,6 +7,7 @@
 //! | `checkpoint/state.safetensors` | weights, Adam's moments, averaged weights, step |
 //! | `preview/step-*.png` | target, reconstruction, random sample |
 //! | `model.safetensors` | the averaged weights that validated best, with the prior of the training latents |
+//! | `latents.safetensors` | of an auto-decoder: the latent table of these weights (see [`latents::save`](crate::train::latents::save)) |
 //!
 //! A run is a function of its configuration: batches and noise are named by their step, so continuing from a
 //! checkpoint gives the weights of the uninterrupted run to the bit (on one device and number of threads).
@@ -28,22 +29,21 @@ use crate::eval::reconstruction::Reconstruction;
 use crate::latent::{Latent, Prior};
 use crate::model::{Model, ModelInfo, Training};
 use crate::output::{Overwrite, write_atomic};
-use crate::train::batch::{Batch, Batches};
 use crate::train::checkpoint::{self, Best, CheckpointInfo};
 use crate::train::config::TrainConfig;
 use crate::train::log::MetricsLog;
 use crate::train::loss::Loss;
+use crate::train::network::{Network, Prepared};
 use crate::train::optimiser::{Group, Optimiser};
 use crate::train::preview;
 use crate::train::progress::{Progress, StepReport, ValidationReport};
-use crate::train::step::batch_loss;
-use crate::vae::{Veni, weights};
+use crate::vae::{Decoder, weights};
 use crate::{Error, Result};
+
+mod results;
 
 /// Batches prepared ahead of the one being computed.
 const AHEAD: usize = 2;
-/// Parameter groups, in the order of their learning rates.
-const GROUPS: [&str; 2] = ["decoder", "encoder"];
 /// Panoramas in a preview.
 const PREVIEW_ROWS: usize = 8;
 
@@ -66,7 +66,7 @@ pub struct Trainer {
     command: String,
     device: Device,
     loss: Loss,
-    veni: Veni,
+    network: Network,
     optimiser: Optimiser,
     best: Option<Best>,
 }
@@ -112,7 +112,7 @@ impl Trainer {
         if path.exists() {
             let (state, info) = checkpoint::load(&path)?;
             trainer.optimiser.restore(state, info.step).map_err(|e| e.in_file(&path))?;
-            trainer.veni = weights::write(trainer.veni, "", &trainer.optimiser.weights())?;
+            trainer.network = weights::write(trainer.network, "", &trainer.optimiser.weights())?;
             trainer.best = info.best;
         }
         Ok(trainer)
@@ -120,15 +120,14 @@ impl Trainer {
 
     fn fresh(folder: &Path, config: TrainConfig, splits: Splits, command: &str) -> Result<Self> {
         let device = config.device.device()?.autodiff();
-        let veni = Veni::new(&config.model, &mut stream(config.seed, Purpose::Weights, 0, 0), &device)?;
-        let groups = GROUPS.iter().zip([&config.decoder, &config.encoder]);
+        let network = Network::new(&config, splits.train.len(), &device)?;
+        let groups = config.groups().into_iter();
         let groups =
-            groups.map(|(prefix, group)| Group { prefix: (*prefix).into(), adam: group.adam }).collect();
-        let optimiser = Optimiser::new(&veni, groups, config.ema_decay)?;
-        let [height, width] = [config.data.height, config.data.width].map(|n| n / config.loss_grid.factor());
-        let loss = Loss::new(&config.loss, height, width, &device);
+            groups.map(|(prefix, group)| Group { prefix: prefix.into(), adam: group.adam }).collect();
+        let optimiser = Optimiser::new(&network, groups, config.ema_decay)?;
+        let loss = Network::loss(&config, &device);
         let (folder, command) = (folder.to_path_buf(), command.to_owned());
-        Ok(Self { folder, config, splits, command, device, loss, veni, optimiser, best: None })
+        Ok(Self { folder, config, splits, command, device, loss, network, optimiser, best: None })
     }
 
     /// What defines this run.
@@ -142,8 +141,8 @@ impl Trainer {
     }
 
     /// The network with its current (not averaged) weights.
-    pub fn network(&self) -> &Veni {
-        &self.veni
+    pub fn network(&self) -> &Network {
+        &self.network
     }
 
     /// Trains until all updates are made or `stop` is raised, which is looked at before every update.
@@ -155,7 +154,7 @@ impl Trainer {
         let (first, total) = (self.steps_done() + 1, self.config.steps);
         progress.start(first - 1, total);
         let splits = self.splits.clone();
-        let batches = Batches::new(&self.config, self.veni.stripes()?, &splits.train);
+        let batches = self.network.source(&self.config, &splits.train)?;
         let finish = std::thread::scope(|scope| {
             let (send, receive) = mpsc::sync_channel(AHEAD);
             // ends early when nobody receives any more
@@ -171,7 +170,7 @@ impl Trainer {
 
     fn updates(
         &mut self,
-        batches: mpsc::Receiver<Batch>,
+        batches: mpsc::Receiver<Prepared>,
         stop: &AtomicBool,
         progress: &mut dyn Progress,
         log: &mut MetricsLog,
@@ -206,31 +205,31 @@ impl Trainer {
     }
 
     /// One update.
-    fn update(&mut self, batch: &Batch) -> Result<StepReport> {
+    fn update(&mut self, batch: &Prepared) -> Result<StepReport> {
         let clock = Instant::now();
-        let loss = batch_loss(&self.veni, batch, &self.loss, &self.device);
-        let total = loss.terms.total();
+        let step = batch.step();
+        let terms = self.network.terms(batch, &self.loss, &self.device);
+        let total = terms.total();
         let value = f64::from(total.clone().into_scalar::<f32>());
         if !value.is_finite() {
             return Err(Error::invalid(format!(
-                "the loss is {value} at update {}: lower the learning rates or the clipping norm",
-                batch.step
+                "the loss is {value} at update {step}: lower the learning rates or the clipping norm"
             )));
         }
         let gradients = total.backward();
         // schedules count from 0: with a warm-up the first update has rate 0, as the authors' has
-        let rates =
-            [&self.config.decoder, &self.config.encoder].map(|group| group.learning_rate.at(batch.step - 1));
-        let (veni, groups) = self.optimiser.step(self.veni.clone(), &gradients, &rates);
-        self.veni = veni;
+        let configured = self.config.groups();
+        let rates: Vec<_> = configured.iter().map(|(_, group)| group.learning_rate.at(step - 1)).collect();
+        let (network, groups) = self.optimiser.step(self.network.clone(), &gradients, &rates);
+        self.network = network;
         let seconds = clock.elapsed().as_secs_f64();
-        let by_name =
-            |f: &dyn Fn(usize) -> f64| GROUPS.iter().enumerate().map(|(i, name)| (*name, f(i))).collect();
+        let by_name = |f: &dyn Fn(usize) -> f64| {
+            configured.iter().enumerate().map(|(i, (name, _))| (*name, f(i))).collect()
+        };
         Ok(StepReport {
-            step: batch.step,
+            step,
             loss: value,
-            parts: loss
-                .terms
+            parts: terms
                 .terms
                 .into_iter()
                 .map(|t| (t.name, f64::from(t.value.into_scalar::<f32>())))
@@ -238,110 +237,8 @@ impl Trainer {
             learning_rate: by_name(&|i| groups[i].learning_rate),
             gradient_norm: by_name(&|i| groups[i].gradient_norm),
             seconds,
-            images_per_second: batch.images as f64 / seconds,
+            images_per_second: batch.images() as f64 / seconds,
         })
-    }
-
-    /// The network that is validated and stored: averaged weights, no gradients.
-    fn averaged(&self) -> Result<Veni> {
-        let weights =
-            if self.config.ema_decay > 0.0 { self.optimiser.averages() } else { self.optimiser.weights() };
-        Ok(weights::write(self.veni.clone(), "", &weights)?.valid())
-    }
-
-    fn validate(&mut self, log: &mut MetricsLog, progress: &mut dyn Progress) -> Result<()> {
-        let veni = self.averaged()?;
-        let subset = self.config.report.train_subset.min(self.splits.train.len());
-        let subset = Dataset::new(self.splits.train.grid(), self.splits.train.items()[..subset].to_vec());
-        let mean = |set: &Dataset| match set.is_empty() {
-            true => Ok(None),
-            false => Reconstruction::autoencoder(&veni, set, Alignment::LogFactor).map(|r| Some(r.mean)),
-        };
-        let (val, train) = (mean(&self.splits.val)?, mean(&subset)?);
-        let step = self.steps_done();
-        // without validation panoramas the last weights are the best known
-        let best = match (val, self.best) {
-            (Some(now), Some(best)) => now.ldr_psnr > best.ldr_psnr,
-            _ => true,
-        };
-        if best {
-            self.best = val.map(|scores| Best { step, ldr_psnr: scores.ldr_psnr });
-            self.store(&veni, 0, step, progress)?;
-        }
-        let report = ValidationReport { step, val, train, best };
-        log.append(&Record { step, validation: &report })?;
-        progress.validation(&report);
-        Ok(())
-    }
-
-    /// Writes `model.safetensors`; the prior is fitted to the training panoramas and `copies` augmented copies.
-    fn store(&self, veni: &Veni, copies: usize, step: u64, progress: &mut dyn Progress) -> Result<()> {
-        let prior = self.prior(veni, copies)?;
-        let data: Vec<_> = self.config.data.folders.iter().filter_map(|f| f.file_name()).collect();
-        let data = data.iter().map(|f| f.to_string_lossy()).collect::<Vec<_>>().join(", ");
-        let info = ModelInfo {
-            training: Some(Training {
-                data: format!("{} panoramas of {data}", self.splits.train.len()),
-                steps: step,
-                seed: self.config.seed,
-                command: self.command.clone(),
-                ..Training::default()
-            }),
-            prior: Some(format!("{} training latents", (1 + copies) * self.splits.train.len())),
-            ..ModelInfo::default()
-        };
-        let mut model = veni.to_model(&self.config.model, info)?;
-        model.set_prior(&prior)?;
-        let path = self.folder.join("model.safetensors");
-        model.save(&path, self.config.report.stored.into(), Overwrite::Replace)?;
-        progress.wrote(&path);
-        Ok(())
-    }
-
-    fn prior(&self, veni: &Veni, copies: usize) -> Result<Prior> {
-        let train = &self.splits.train;
-        let batches = Batches::new(&self.config, veni.stripes()?, train);
-        let (mut codes, mut variances) = (Vec::new(), Vec::new());
-        for copy in 0..=copies {
-            let images: Vec<_> = (train.items().iter().enumerate())
-                // slots beyond any batch: copies that no update has seen
-                .map(|(i, item)| match copy {
-                    0 => item.log_radiance.clone(),
-                    _ => batches.augmented(i, u64::MAX, (copy * train.len() + i) as u64),
-                })
-                .collect();
-            let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
-            for (encoded, item) in veni.encode(train.grid(), &views)?.into_iter().zip(train.items()) {
-                codes.push(Latent { log_exposure: item.log_exposure, ..Latent::new(encoded.vectors) });
-                variances.extend(encoded.variances);
-            }
-        }
-        if codes.len() < 2 {
-            return Ok(Prior::standard(veni.latent_vectors()));
-        }
-        Prior::fit(&codes, (!variances.is_empty()).then_some(variances.as_slice()))
-    }
-
-    fn preview(&self, progress: &mut dyn Progress) -> Result<()> {
-        let veni = self.averaged()?;
-        let step = self.steps_done();
-        let prior = self.prior(&veni, 0)?;
-        // validation panoramas first: they say more
-        let items: Vec<_> =
-            self.splits.val.items().iter().chain(self.splits.train.items()).take(PREVIEW_ROWS).collect();
-        let grid = self.splits.train.grid();
-        let images: Vec<_> = items.iter().map(|i| i.log_radiance.as_slice()).collect();
-        let latents: Vec<_> = veni.encode(grid, &images)?.into_iter().map(|e| e.vectors).collect();
-        let mut rng = stream(self.config.seed, Purpose::Preview, 0, 0);
-        let samples: Vec<_> = items.iter().map(|_| Latent::sample(&prior, &mut rng).vectors).collect();
-        let decoded = veni.decode(grid, &latents).into_iter().zip(veni.decode(grid, &samples));
-        let rows: Vec<_> = (items.iter().zip(decoded))
-            .map(|(item, (reconstruction, sample))| vec![item.log_radiance.clone(), reconstruction, sample])
-            .collect();
-        let path = self.folder.join("preview").join(format!("step-{step:06}.png"));
-        preview::write(&path, grid, &rows)?;
-        progress.wrote(&path);
-        Ok(())
     }
 
     fn checkpoint(&self, progress: &mut dyn Progress) -> Result<()> {
@@ -349,18 +246,6 @@ impl Trainer {
         checkpoint::save(&path, &self.optimiser.state(), &CheckpointInfo::new(self.steps_done(), self.best))?;
         progress.wrote(&path);
         Ok(())
-    }
-
-    /// The last validation and preview, then the best model again with the full prior.
-    fn finish(&mut self, log: &mut MetricsLog, progress: &mut dyn Progress) -> Result<()> {
-        self.validate(log, progress)?;
-        self.preview(progress)?;
-        let path = self.folder.join("model.safetensors");
-        let model = Model::load(&path)?;
-        let step = model.info().training.as_ref().map_or(self.steps_done(), |t| t.steps);
-        // from here on the file is complete, and stays: the stored weights, not the last ones
-        let veni = Veni::from_model(&model, &self.config.device.device()?)?;
-        self.store(&veni, self.config.report.prior_copies, step, progress)
     }
 
     fn checkpoint_path(&self) -> PathBuf {

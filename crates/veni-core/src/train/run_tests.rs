@@ -3,6 +3,7 @@
 use super::*;
 use crate::panorama::{Panorama, Precision, WriteFormat, WriteOptions};
 use crate::sphere::Equirect;
+use crate::train::loss::LossForm;
 use crate::train::presets::Preset;
 use crate::train::schedule::WeightSchedule;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -17,15 +18,19 @@ fn sky(azimuth: f32) -> Panorama {
     })
 }
 
-/// A folder with `train/` (two skies) and `val/` (one), and a short run on it.
+/// A folder with `train/` (two skies) and `val/` (one), and a short run of the auto-encoder on it.
 fn setup(steps: u64) -> (tempfile::TempDir, TrainConfig) {
+    setup_of(Preset::Tiny.config(3), steps)
+}
+
+fn setup_of(config: TrainConfig, steps: u64) -> (tempfile::TempDir, TrainConfig) {
     let folder = tempfile::tempdir().unwrap();
     for (name, azimuth) in [("train/a", 0.3), ("train/b", 2.0), ("val/c", 4.0)] {
         let path = folder.path().join("data").join(name).with_extension("exr");
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         sky(azimuth).write(&path, &WriteOptions::new(WriteFormat::Exr(Precision::Float))).unwrap();
     }
-    let mut config = Preset::Tiny.config(3).with_overrides(&[format!("steps={steps}")]).unwrap();
+    let mut config = config.with_overrides(&[format!("steps={steps}")]).unwrap();
     config.data.folders = vec![folder.path().join("data")];
     (folder, config)
 }
@@ -64,7 +69,18 @@ fn losses(folder: &Path) -> Vec<(u64, Option<f64>)> {
 
 #[test]
 fn stopped_and_killed_runs_continue_to_the_bit() {
-    let (folder, mut config) = setup(4);
+    continues_to_the_bit(Preset::Tiny.config(3), &[]);
+}
+
+#[test]
+fn an_auto_decoder_continues_to_the_bit_too() {
+    let config = Preset::Tiny.auto_decoder(3);
+    continues_to_the_bit(config, &["latents.safetensors"]);
+}
+
+fn continues_to_the_bit(config: TrainConfig, more: &[&str]) {
+    let (folder, mut config) = setup_of(config, 4);
+    let original = config.clone();
     config.report.checkpoint_every = 2;
     config.report.validate_every = 2;
     let [whole, stopped, killed] = ["whole", "stopped", "killed"].map(|name| folder.path().join(name));
@@ -87,15 +103,16 @@ fn stopped_and_killed_runs_continue_to_the_bit() {
     complete(&mut trainer);
 
     for other in [&stopped, &killed] {
-        for name in ["checkpoint/state.safetensors", "model.safetensors", "preview/step-000004.png"] {
+        let files = ["checkpoint/state.safetensors", "model.safetensors", "preview/step-000004.png"];
+        for name in files.iter().chain(more) {
             assert!(file(&whole, name) == file(other, name), "{name} differs in {}", other.display());
         }
         assert_eq!(losses(&whole), losses(other));
     }
     // and another seed is another run
-    let (other, mut config) = setup(4);
+    let mut config = original;
     config.seed = 1;
-    let path = other.path().join("seed");
+    let path = folder.path().join("seed");
     complete(&mut Trainer::create(&path, config, "test").unwrap());
     assert_ne!(file(&whole, "checkpoint/state.safetensors"), file(&path, "checkpoint/state.safetensors"));
 }
@@ -115,6 +132,48 @@ fn a_tiny_model_learns_two_panoramas() {
     assert!(model.has_encoder() && model.has_prior());
     let training = model.info().training.clone().unwrap();
     assert_eq!((training.seed, training.command.as_str()), (0, "test"));
+}
+
+#[test]
+fn an_auto_decoder_learns_its_panoramas_and_leaves_its_table() {
+    let mut config = Preset::Tiny.auto_decoder(3);
+    config.report.validate_every = 0;
+    config.report.stored = crate::train::config::Stored::F32;
+    let (folder, mut config) = setup_of(config, 150);
+    config.latents.as_mut().unwrap().free_exposure = true;
+    let out = folder.path().join("run");
+    let mut trainer = Trainer::create(&out, config, "test").unwrap();
+    complete(&mut trainer);
+    let losses: Vec<f64> = losses(&out).into_iter().filter_map(|(_, loss)| loss).collect();
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    let (first, last) = (mean(&losses[..5]), mean(&losses[145..]));
+    assert!(last < first / 3.0, "loss {first} to {last}");
+
+    let model = Model::load(out.join("model.safetensors")).unwrap();
+    assert!(!model.has_encoder() && model.has_prior());
+    assert_eq!(model.config().kind, crate::model::ModelKind::Reni);
+    // the paper's network: the lighting world decodes it
+    assert!(model.decoder().unwrap().condition(&Latent::from_seed(&model.prior(), 1)).is_ok());
+    let bytes = file(&out, "latents.safetensors");
+    let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
+    let about: serde_json::Value =
+        serde_json::from_str(&header.metadata().as_ref().unwrap()["veni-latents"]).unwrap();
+    assert_eq!(about["panoramas"], serde_json::json!(["a", "b"]));
+    assert_eq!(about["model"], model.hash());
+    let tensors = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+    let table = weights::read(trainer.network(), "");
+    for name in ["mean", "log_variance", "scale"] {
+        let found: Vec<f32> = tensors
+            .tensor(name)
+            .unwrap()
+            .data()
+            .as_chunks()
+            .0
+            .iter()
+            .map(|b| f32::from_le_bytes(*b))
+            .collect();
+        assert_eq!(found, table[&format!("latents.{name}")].data, "{name}");
+    }
 }
 
 #[test]
@@ -145,10 +204,29 @@ fn gradients_of_the_whole_loss_match_finite_differences() {
     config.loss.mage = WeightSchedule::Constant(0.0);
     // one scene whatever the presets draw: others have kinks of the display curve within the step
     config.augment = crate::data::AugmentConfig::default();
-    let trainer = Trainer::create(&folder.path().join("run"), config, "test").unwrap();
+    gradients_match(&folder.path().join("run"), config);
+}
+
+/// The same from the table to the loss of an auto-decoder, in both forms, with every term that it can have.
+#[test]
+fn gradients_of_an_auto_decoder_match_finite_differences() {
+    for form in [LossForm::Reference, LossForm::Corrected] {
+        let mut config = Preset::Tiny.auto_decoder(3);
+        config.loss.form = form;
+        config.loss.kld = WeightSchedule::Constant(0.01);
+        config.loss.level = WeightSchedule::Constant(1.0);
+        config.loss.log_mse = WeightSchedule::Constant(0.3);
+        let (folder, mut config) = setup_of(config, 1);
+        config.latents.as_mut().unwrap().free_exposure = true;
+        gradients_match(&folder.path().join("run"), config);
+    }
+}
+
+fn gradients_match(run: &Path, config: TrainConfig) {
+    let trainer = Trainer::create(run, config, "test").unwrap();
     let veni = trainer.network().clone();
-    let batch = Batches::new(trainer.config(), veni.stripes().unwrap(), &trainer.splits.train).prepare(1);
-    let value = |veni: &Veni| batch_loss(veni, &batch, &trainer.loss, &trainer.device).terms.total();
+    let batch = veni.source(trainer.config(), &trainer.splits.train).unwrap().prepare(1);
+    let value = |veni: &Network| veni.terms(&batch, &trainer.loss, &trainer.device).total();
     let gradients = weights::gradients(&veni, "", &value(&veni).backward());
     let start = weights::read(&veni, "");
     let mut checked = 0;

@@ -3,6 +3,7 @@
 pub mod decoder;
 pub mod encoder;
 pub mod posterior;
+pub mod reni;
 pub mod veni;
 #[cfg(test)]
 mod veni_tests;
@@ -11,4 +12,5 @@ pub mod weights;
 pub use decoder::Decoder;
 pub use encoder::{Encoder, FoldedEncoder};
 pub use posterior::Posterior;
+pub use reni::{LatentTable, Reni};
 pub use veni::{Encoded, Veni};

@@ -125,7 +125,7 @@ impl Veni {
 
     /// The device that holds the weights.
     pub fn device(&self) -> Device {
-        self.decoder.output.bias.val().device()
+        self.decoder.device()
     }
 }
 
@@ -134,7 +134,7 @@ impl Veni {
 /// # Panics
 /// If a latent does not have N vectors.
 pub fn decode(decoder: &Decoder, grid: Equirect, latents: &[Vec<[f32; 3]>]) -> Vec<Vec<f32>> {
-    let device = decoder.output.bias.val().device();
+    let device = decoder.device();
     let n = decoder.latent_vectors();
     let directions = TensorData::new(grid.directions().into_flattened(), [grid.len(), 3]);
     let directions = Tensor::<2>::from_data(directions, &device);

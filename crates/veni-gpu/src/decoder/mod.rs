@@ -65,6 +65,7 @@ impl GpuDecoder {
     /// # Errors
     /// As [`GpuDecoder::new`], and [`Error::Unsupported`] if the decoder is too wide for the kernel.
     pub fn with_kernel(device: &Device, model: &Model, choice: KernelChoice) -> Result<Self> {
+        let decoder = model.decoder()?;
         let packed = pack_model(model);
         let (kernel, half) = choose(device, &packed, choice)?;
         let weights = if half.is_some() { Weights::Half } else { Weights::Single };
@@ -77,7 +78,7 @@ impl GpuDecoder {
             vectors: storage(device, "veni vectors", bytemuck::cast_slice(&packed.vectors))?,
             pipelines: Pipelines::default(),
             device: device.clone(),
-            decoder: model.decoder()?,
+            decoder,
             sizes: packed.sizes,
             model: model.hash(),
             kernel,

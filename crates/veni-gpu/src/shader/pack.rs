@@ -32,6 +32,9 @@ impl MatrixWords {
 }
 
 /// Packs what does not depend on a latent.
+///
+/// # Panics
+/// If [`Model::decoder`] refuses the network.
 pub fn pack_model(model: &Model) -> PackedModel {
     let sizes = Sizes::from(model.config());
     let row = 4 * sizes.columns();

@@ -8,15 +8,21 @@ use veni_core::model::Model;
 use veni_core::train::config::TrainConfig;
 use veni_core::train::presets::Preset;
 
-use super::{PresetName, Train, shell_word};
+use super::{PresetName, SystemName, Train, shell_word};
 
 impl Train {
     /// All settings: preset or file, then the options, then `--set`.
     pub(super) fn settings(&self) -> Result<TrainConfig> {
         let mut config = match &self.config {
             Some(path) => read(path)?,
-            None => Preset::from(self.preset.unwrap_or(PresetName::Small))
-                .config(self.latent_vectors.unwrap_or(9)),
+            None => {
+                let preset = Preset::from(self.preset.unwrap_or(PresetName::Small));
+                let n = self.latent_vectors.unwrap_or(9);
+                match self.system.unwrap_or_default() {
+                    SystemName::Veni => preset.config(n),
+                    SystemName::Reni => preset.auto_decoder(n),
+                }
+            }
         };
         if !self.data.is_empty() {
             config.data.folders = self.data.clone();
@@ -38,7 +44,8 @@ impl Train {
     /// With `--resume`: whatever else was typed must be what the run was begun with.
     pub(super) fn check_same(&self, stored: &Path) -> Result<()> {
         let described = !self.data.is_empty() || self.config.is_some();
-        let changed = self.preset.is_some()
+        let changed = self.system.is_some()
+            || self.preset.is_some()
             || self.latent_vectors.is_some()
             || self.seed.is_some()
             || self.steps.is_some()
@@ -88,6 +95,9 @@ impl Train {
         }
         if let Some(config) = &self.config {
             words.push(format!("--config {}", last(config)));
+        }
+        if self.system == Some(SystemName::Reni) {
+            words.push("--system reni++".to_owned());
         }
         if let Some(preset) = self.preset {
             words.push(format!("--preset {}", format!("{preset:?}").to_lowercase()));

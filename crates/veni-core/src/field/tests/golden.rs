@@ -50,7 +50,13 @@ impl Case {
 
     fn model_config(&self, vn_relu: VnReluForm) -> ModelConfig {
         let (hidden, layers) = (self.size("hidden_features"), self.size("num_attention_layers"));
-        let decoder = DecoderConfig { hidden, layers, heads: self.size("num_attention_heads"), vn_relu };
+        let decoder = DecoderConfig {
+            hidden,
+            layers,
+            heads: self.size("num_attention_heads"),
+            vn_relu,
+            ..DecoderConfig::default()
+        };
         ModelConfig { kind: ModelKind::Veni, latent_vectors: self.size("latent_dim"), decoder, encoder: None }
     }
 

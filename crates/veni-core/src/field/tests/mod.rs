@@ -14,7 +14,7 @@ fn filler(latent_vectors: usize) -> Model {
 
 /// A small one with sizes that fill no register evenly.
 fn odd(latent_vectors: usize, hidden: usize, vn_relu: VnReluForm) -> Model {
-    let decoder = DecoderConfig { hidden, layers: 3, heads: 1, vn_relu };
+    let decoder = DecoderConfig { hidden, layers: 3, heads: 1, vn_relu, ..DecoderConfig::default() };
     Model::filler(&ModelConfig { decoder, ..ModelConfig::decode_only(latent_vectors) }, 11).unwrap()
 }
 

@@ -123,6 +123,8 @@ pub struct Loss {
     config: LossConfig,
     rows: Tensor<4>,
     mage: Option<MageForm>,
+    /// Whether images are rays, which count alike.
+    rays: bool,
 }
 
 impl Loss {
@@ -137,11 +139,22 @@ impl Loss {
         };
         let mage = (!config.mage.is_off())
             .then(|| MageForm::new(config.form, config.mage_scales, height, width, device));
-        Self { config: config.clone(), rows, mage }
+        Self { config: config.clone(), rows, mage, rays: false }
+    }
+
+    /// For `rays` per panorama, as images `[B, rays, 1, 3]`. They are drawn evenly over the sphere and count alike.
+    /// The reference form is RENI++'s: the scale-invariant error is taken over all rays of the batch jointly.
+    ///
+    /// # Panics
+    /// If MAGE is on: rays have no neighbours.
+    pub fn rays(config: &LossConfig, rays: usize, device: &Device) -> Self {
+        assert!(config.mage.is_off(), "MAGE needs an image");
+        Self { config: config.clone(), rows: Tensor::ones([1, rays, 1, 1], device), mage: None, rays: true }
     }
 
     /// All terms whose weight in `step` is not 0. Images `[B, H, W, 3]`; `posterior` is the encoder's
-    /// (mean `[B, N, 3]`, log variance `[B, N, 1]`), absent for an auto-decoder or in evaluation.
+    /// (mean `[B, N, 3]`, log variance `[B, N, 1]`) or, per coordinate, an auto-decoder's (`[B, N, 3]` both); absent
+    /// in evaluation.
     pub fn terms(
         &self,
         step: u64,
@@ -169,12 +182,13 @@ impl Loss {
             let (p, i, rows) = images();
             match form {
                 LossForm::Corrected => scale_invariant::scale_invariant(p, i, rows),
+                LossForm::Reference if self.rays => scale_invariant::rays(p, i),
                 LossForm::Reference => scale_invariant::reference(p, i, rows).mean(),
             }
         });
         put("level", &config.level, &|| {
-            let (p, i, _) = images();
-            let weights = rows::solid_angle(p.dims()[1], &p.device());
+            let (p, i, rows) = images();
+            let weights = if self.rays { rows } else { rows::solid_angle(p.dims()[1], &p.device()) };
             scale_invariant::level(p, i, weights)
         });
         put("cosine", &config.cosine, &|| {
@@ -185,7 +199,13 @@ impl Loss {
             }
         });
         if let Some((mean, log_variance)) = &posterior {
-            put("kld", &config.kld, &|| kld::isotropic(mean.clone(), log_variance.clone()).mean());
+            put("kld", &config.kld, &|| {
+                let (mean, log_variance) = (mean.clone(), log_variance.clone());
+                match log_variance.dims()[2] {
+                    3 => kld::per_coordinate(mean, log_variance),
+                    _ => kld::isotropic(mean, log_variance).mean(),
+                }
+            });
         }
         put("log_mse", &config.log_mse, &|| error(Space::Log));
         put("hdr_mse", &config.hdr_mse, &|| error(Space::Hdr));

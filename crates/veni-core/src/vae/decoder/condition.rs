@@ -1,15 +1,16 @@
-//! What the network is told about the latent apart from its products with the direction.
+//! The Vector-Neuron invariants of the latent vectors.
 
 use crate::model::VnReluForm;
 use crate::nn::uniform;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 /// The Vector-Neuron invariant of each latent vector.
 ///
-/// Per vector z the official network computes y = s·z_xy, q = W a₀ y, k = U a₀ y (two channels, e = 0, 1),
-/// A = VN-ReLU(q, k), and reads ⟨y, A_e⟩. Every vector in it is parallel to z_xy, so with α = W a₀,
+/// Under SO(2), per vector z, the official network computes y = s·z_xy, q = W a₀ y, k = U a₀ y (two channels,
+/// e = 0, 1), A = VN-ReLU(q, k), and reads ⟨y, A_e⟩. Every vector in it is parallel to z_xy, so with α = W a₀,
 /// β = U a₀, t = s²|z_xy|² it has a closed form, which has no norm in it and is smooth at z_xy = 0:
 ///
 /// ```text
@@ -19,57 +20,68 @@ use rand::Rng;
 /// ```
 ///
 /// It knows only |z_xy| and z_z; relative angles between latent vectors reach the network through the
-/// directional input.
+/// directional input. Under SO(3) y = s·z and there are three channels.
 #[derive(Module, Debug)]
 pub struct Condition {
     /// s, `[1]`.
     pub scale: Param<Tensor<1>>,
-    /// a₀, `[1, 2]`.
+    /// a₀, `[1, c]`; c is 2 under SO(2), 3 under SO(3).
     pub linear: Param<Tensor<2>>,
-    /// W, `[in 2, out 2]`.
+    /// W, `[in c, out c]`.
     pub w: Param<Tensor<2>>,
-    /// U, `[in 2, out 2]`.
+    /// U, `[in c, out c]`.
     pub u: Param<Tensor<2>>,
     #[module(skip)]
     form: VnReluForm,
 }
 
 impl Condition {
-    /// Weights uniform in ±1/√inputs.
+    /// Weights uniform in ±1/√inputs, for `channels` 2 or 3.
     ///
     /// Under [`VnReluForm::Projection`] a channel with α_e β_e < 0 is exactly 0 for every latent and gets
     /// no gradient, so it would stay dead for ever. The sign of column e of U is therefore chosen such
-    /// that both channels start alive; U enters that form through the sign only.
-    pub fn new(form: VnReluForm, rng: &mut impl Rng, device: &Device) -> Self {
+    /// that every channel starts alive; U enters that form through the sign only.
+    pub fn new(form: VnReluForm, channels: usize, rng: &mut impl Rng, device: &Device) -> Self {
         let mut draw = |n: usize, bound: f32| -> Vec<f32> {
             (0..n).map(|_| rand::RngExt::random_range(rng, -bound..bound)).collect()
         };
-        let (linear, w, mut u) = (draw(2, 1.0), draw(4, 0.5f32.sqrt()), draw(4, 0.5f32.sqrt()));
+        let (c, bound) = (channels, (channels as f32).recip().sqrt());
+        let weights = [draw(c, 1.0), draw(c * c, bound), draw(c * c, bound)];
+        Self::of(form, uniform([1], 1.0, rng, device), weights, device)
+    }
+
+    /// The same with weights from N(0, 1), as in RENI++.
+    pub fn standard_normal(form: VnReluForm, channels: usize, rng: &mut impl Rng, device: &Device) -> Self {
+        let mut draw = |n: usize| -> Vec<f32> { (0..n).map(|_| StandardNormal.sample(rng)).collect() };
+        let c = channels;
+        let (weights, scale) = ([draw(c), draw(c * c), draw(c * c)], draw(1));
+        let scale = Param::from_data(TensorData::new(scale, [1]), device);
+        Self::of(form, scale, weights, device)
+    }
+
+    /// From the values of a₀, W and U, which are made alive.
+    fn of(form: VnReluForm, scale: Param<Tensor<1>>, weights: [Vec<f32>; 3], device: &Device) -> Self {
+        let [linear, w, mut u] = weights;
+        let c = linear.len();
         if form == VnReluForm::Projection {
-            for e in 0..2 {
-                let through = |m: &[f32]| linear[0] * m[e] + linear[1] * m[2 + e];
+            for e in 0..c {
+                let through = |m: &[f32]| (0..c).map(|i| linear[i] * m[c * i + e]).sum::<f32>();
                 if through(&w) * through(&u) < 0.0 {
-                    (u[e], u[2 + e]) = (-u[e], -u[2 + e]);
+                    (0..c).for_each(|i| u[c * i + e] = -u[c * i + e]);
                 }
             }
         }
         let param =
             |values: Vec<f32>, shape: [usize; 2]| Param::from_data(TensorData::new(values, shape), device);
-        Self {
-            scale: uniform([1], 1.0, rng, device),
-            linear: param(linear, [1, 2]),
-            w: param(w, [2, 2]),
-            u: param(u, [2, 2]),
-            form,
-        }
+        Self { scale, linear: param(linear, [1, c]), w: param(w, [c, c]), u: param(u, [c, c]), form }
     }
 
-    /// Latents `[B, N, 3]` → conditioning `[B, 3N]`: (a_0, a_1, z_z) of each vector, one after the other.
-    pub fn forward(&self, latent: Tensor<3>) -> Tensor<2> {
-        let [batch, n, _] = latent.dims();
-        let xy = latent.clone().narrow(2, 0, 2);
+    /// Latents `[B, N, 3]` → `[B, N, 3]`: (a_0, a_1, z_z) of each vector, or (a_0, a_1, a_2).
+    pub fn forward(&self, latent: Tensor<3>) -> Tensor<3> {
+        let channels = self.w.dims()[0];
+        let turned = latent.clone().narrow(2, 0, channels);
         let scale: Tensor<3> = self.scale.val().unsqueeze();
-        let t = (xy.clone() * xy).sum_dim(2) * (scale.clone() * scale);
+        let t = (turned.clone() * turned).sum_dim(2) * (scale.clone() * scale);
         let alpha: Tensor<3> = self.linear.val().matmul(self.w.val()).unsqueeze();
         let beta: Tensor<3> = self.linear.val().matmul(self.u.val()).unsqueeze();
         let dropped = (alpha.clone() * beta.clone()).detach().lower_elem(0.0).float();
@@ -79,11 +91,11 @@ impl Condition {
             VnReluForm::ReferenceNormGuard => dropped * length(beta, t.clone(), 1e-12),
         };
         let a = alpha * t * (removed.neg() + 1.0);
-        Tensor::cat(vec![a, latent.narrow(2, 2, 1)], 2).reshape([batch, 3 * n])
+        if channels == 3 { a } else { Tensor::cat(vec![a, latent.narrow(2, 2, 1)], 2) }
     }
 }
 
-/// m/√max(m, g) with m = β² t: the length |k|, guarded from below. `[1, 1, 2]` and `[B, N, 1]` → `[B, N, 2]`.
+/// m/√max(m, g) with m = β² t: the length |k|, guarded from below. `[1, 1, c]` and `[B, N, 1]` → `[B, N, c]`.
 fn length(beta: Tensor<3>, t: Tensor<3>, guard: f64) -> Tensor<3> {
     let m = beta.clone() * beta * t;
     m.clone() / m.clamp_min(guard).sqrt()

@@ -28,7 +28,7 @@ impl Norm {
 
     /// Weight and bias of `next` applied to γ x̂ + β, as a map of the normalised x̂ itself:
     /// (diag(γ) W, β W + b). Moves two passes over all directions into the weights.
-    fn fold(&self, next: &Linear) -> (Tensor<2>, Tensor<1>) {
+    pub(super) fn fold(&self, next: &Linear) -> (Tensor<2>, Tensor<1>) {
         let weight = next.weight.val();
         let bias = self.beta.val().unsqueeze::<2>().matmul(weight.clone()).squeeze_dim(0) + next.bias.val();
         (self.gamma.val().unsqueeze_dim(1) * weight, bias)
@@ -75,13 +75,7 @@ impl Layer {
 
     /// x + att `[B, R, h]` → x̂ `[B, R, h]`, whose γ₂ x̂ + β₂ is the layer's output.
     pub(super) fn forward(&self, x: Tensor<3>) -> Tensor<3> {
-        let x = normalise(x);
-        let (weight, bias) = self.norm1.fold(&self.ff1);
-        let hidden = relu(module::linear(x.clone(), weight, Some(bias)));
-        // γ₁ x̂ + FF: the offset β₁ joins the bias of the second map.
-        let bias = self.ff2.bias.val() + self.norm1.beta.val();
-        let branch = module::linear(hidden, self.ff2.weight.val(), Some(bias));
-        normalise(branch + x * self.norm1.gamma.val().unsqueeze())
+        perceptron(x, &self.norm1, &self.ff1, &self.ff2)
     }
 
     /// The input of the layer after this one: γ₂ x̂ + (β₂ + that layer's attention output `[B, h]`).
@@ -95,6 +89,18 @@ impl Layer {
         let (weight, bias) = self.norm2.fold(output);
         module::linear(x, weight, Some(bias))
     }
+}
+
+/// What follows the attention: with y = LN₁(x + att), x + att `[B, R, h]` → the normalised y + FF(y) `[B, R, h]`,
+/// without γ₂ and β₂.
+pub(super) fn perceptron(x: Tensor<3>, norm1: &Norm, ff1: &Linear, ff2: &Linear) -> Tensor<3> {
+    let x = normalise(x);
+    let (weight, bias) = norm1.fold(ff1);
+    let hidden = relu(module::linear(x.clone(), weight, Some(bias)));
+    // γ₁ x̂ + FF: the offset β₁ joins the bias of the second map.
+    let bias = ff2.bias.val() + norm1.beta.val();
+    let branch = module::linear(hidden, ff2.weight.val(), Some(bias));
+    normalise(branch + x * norm1.gamma.val().unsqueeze())
 }
 
 /// (x − mean)/√(variance + ε) over the last axis; biased variance.

@@ -11,7 +11,7 @@ const FORMS: [VnReluForm; 3] =
     [VnReluForm::Projection, VnReluForm::Reference, VnReluForm::ReferenceNormGuard];
 
 fn decoder(form: VnReluForm, device: &Device) -> Decoder {
-    let config = DecoderConfig { hidden: 16, layers: 2, heads: 2, vn_relu: form };
+    let config = DecoderConfig { hidden: 16, layers: 2, heads: 2, vn_relu: form, ..DecoderConfig::default() };
     Decoder::new(&config, N, &mut ChaCha8Rng::seed_from_u64(7), device)
 }
 
@@ -169,7 +169,7 @@ fn conditioning_starts_alive_whatever_the_seed() {
     let device = Device::flex();
     for seed in 0..40 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let condition = Condition::new(VnReluForm::Projection, &mut rng, &device);
+        let condition = Condition::new(VnReluForm::Projection, 2, &mut rng, &device);
         let a = condition.forward(latent(&device));
         let dead = values(&a).iter().filter(|v| **v == 0.0).count();
         assert_eq!(dead, 0, "seed {seed}");
@@ -201,3 +201,5 @@ fn a_latent_of_another_size_is_refused() {
     let device = Device::flex();
     decoder(VnReluForm::Projection, &device).forward(Tensor::zeros([1, 5, 3], &device), directions(&device));
 }
+
+mod systems;

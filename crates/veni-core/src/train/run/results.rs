@@ -1,0 +1,235 @@
+//! What a run says of itself: validation, previews, the model file.
+
+use super::*;
+use crate::data::coarsen::{averaged, coarse_grid};
+use crate::fit::{FitTarget, fit};
+use crate::sphere::Equirect;
+use crate::train::batch::Batches;
+use crate::train::latents::{self, LatentsConfig};
+use crate::vae::veni::decode;
+use crate::vae::{LatentTable, Reni, Veni};
+
+impl Trainer {
+    /// The network that is validated and stored: averaged weights, no gradients.
+    pub(super) fn averaged(&self) -> Result<Network> {
+        let weights =
+            if self.config.ema_decay > 0.0 { self.optimiser.averages() } else { self.optimiser.weights() };
+        Ok(weights::write(self.network.clone(), "", &weights)?.valid())
+    }
+
+    pub(super) fn validate(&mut self, log: &mut MetricsLog, progress: &mut dyn Progress) -> Result<()> {
+        let network = self.averaged()?;
+        let subset = |set: &Dataset, most: usize| {
+            Dataset::new(set.grid(), set.items()[..most.min(set.len())].to_vec())
+        };
+        let val = match &self.config.latents {
+            Some(latents) => subset(&self.splits.val, latents.validation_panoramas),
+            None => self.splits.val.clone(),
+        };
+        let mean = |set: &Dataset, decoded: Vec<Vec<f32>>| {
+            let scores = |decoded| Reconstruction::compare(set, decoded, Alignment::LogFactor).mean;
+            (!set.is_empty()).then(|| scores(&decoded))
+        };
+        let train = subset(&self.splits.train, self.config.report.train_subset);
+        let (val, train) = (
+            mean(&val, self.reconstructed(&network, &val, false)?),
+            mean(&train, self.reconstructed(&network, &train, true)?),
+        );
+        let step = self.steps_done();
+        // without validation panoramas the last weights are the best known
+        let best = match (val, self.best) {
+            (Some(now), Some(best)) => now.ldr_psnr > best.ldr_psnr,
+            _ => true,
+        };
+        if best {
+            self.best = val.map(|scores| Best { step, ldr_psnr: scores.ldr_psnr });
+            self.store(&network, 0, step, progress)?;
+        }
+        let report = ValidationReport { step, val, train, best };
+        log.append(&Record { step, validation: &report })?;
+        progress.validation(&report);
+        Ok(())
+    }
+
+    /// Log radiance decoded from the latents of panoramas: those that the encoder gives them, or, of an auto-decoder,
+    /// the first rows of its table (`known`) or fitted ones.
+    fn reconstructed(&self, network: &Network, set: &Dataset, known: bool) -> Result<Vec<Vec<f32>>> {
+        let (grid, images) = (set.grid(), views(set.items()));
+        let latents = match (network, &self.config.latents) {
+            (Network::Veni(veni), _) => {
+                veni.encode(grid, &images)?.into_iter().map(|e| Latent::new(e.vectors)).collect()
+            }
+            (Network::Reni(reni), _) if known => {
+                table_rows(&reni.latents).into_iter().take(set.len()).map(|row| row.latent).collect()
+            }
+            (Network::Reni(reni), Some(config)) => fitted(&reni.decoder, grid, &images, config)?,
+            (Network::Reni(_), None) => unreachable!("checked with the configuration"),
+        };
+        let vectors: Vec<_> = latents.iter().map(|z| z.vectors.clone()).collect();
+        let mut decoded = decode(network.decoder(), grid, &vectors);
+        for (image, latent) in decoded.iter_mut().zip(&latents) {
+            image.iter_mut().for_each(|v| *v += latent.log_exposure);
+        }
+        Ok(decoded)
+    }
+
+    /// Writes `model.safetensors`; the prior is fitted to the training panoramas and `copies` augmented copies. With
+    /// an auto-decoder also `latents.safetensors`.
+    fn store(&self, network: &Network, copies: usize, step: u64, progress: &mut dyn Progress) -> Result<()> {
+        let prior = self.prior(network, copies)?;
+        let data: Vec<_> = self.config.data.folders.iter().filter_map(|f| f.file_name()).collect();
+        let data = data.iter().map(|f| f.to_string_lossy()).collect::<Vec<_>>().join(", ");
+        let info = ModelInfo {
+            training: Some(Training {
+                data: format!("{} panoramas of {data}", self.splits.train.len()),
+                steps: step,
+                seed: self.config.seed,
+                command: self.command.clone(),
+                ..Training::default()
+            }),
+            prior: Some(format!("{} training latents", (1 + copies) * self.splits.train.len())),
+            ..ModelInfo::default()
+        };
+        let mut model = match network {
+            Network::Veni(veni) => veni.to_model(&self.config.model, info)?,
+            Network::Reni(reni) => reni.to_model(&self.config.model, info)?,
+        };
+        model.set_prior(&prior)?;
+        let path = self.folder.join("model.safetensors");
+        model.save(&path, self.config.report.stored.into(), Overwrite::Replace)?;
+        progress.wrote(&path);
+        if let Network::Reni(Reni { latents: table, .. }) = network {
+            let path = self.folder.join("latents.safetensors");
+            latents::save(&path, table, &self.splits.train, &model.hash())?;
+            progress.wrote(&path);
+        }
+        Ok(())
+    }
+
+    fn prior(&self, network: &Network, copies: usize) -> Result<Prior> {
+        let (codes, variances) = match network {
+            Network::Veni(veni) => self.encoded(veni, copies)?,
+            Network::Reni(reni) => {
+                let rows = table_rows(&reni.latents).into_iter().zip(self.splits.train.items());
+                rows.map(|(row, item)| {
+                    let log_exposure = row.latent.log_exposure + item.log_exposure;
+                    (Latent { log_exposure, ..row.latent }, row.variances)
+                })
+                .unzip()
+            }
+        };
+        if codes.len() < 2 {
+            return Ok(Prior::standard(network.decoder().latent_vectors()));
+        }
+        Prior::fit(&codes, (!variances.is_empty()).then_some(variances.as_slice()))
+    }
+
+    /// Latents and variances of the training panoramas and `copies` augmented copies of each.
+    fn encoded(&self, veni: &Veni, copies: usize) -> Result<(Vec<Latent>, Vec<Vec<f32>>)> {
+        let train = &self.splits.train;
+        let batches = Batches::new(&self.config, veni.stripes()?, train);
+        let (mut codes, mut variances) = (Vec::new(), Vec::new());
+        for copy in 0..=copies {
+            let images: Vec<_> = (train.items().iter().enumerate())
+                // slots beyond any batch: copies that no update has seen
+                .map(|(i, item)| match copy {
+                    0 => item.log_radiance.clone(),
+                    _ => batches.augmented(i, u64::MAX, (copy * train.len() + i) as u64),
+                })
+                .collect();
+            let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
+            for (encoded, item) in veni.encode(train.grid(), &views)?.into_iter().zip(train.items()) {
+                codes.push(Latent { log_exposure: item.log_exposure, ..Latent::new(encoded.vectors) });
+                variances.extend(encoded.variances);
+            }
+        }
+        Ok((codes, variances))
+    }
+
+    pub(super) fn preview(&self, progress: &mut dyn Progress) -> Result<()> {
+        let network = self.averaged()?;
+        let step = self.steps_done();
+        let prior = self.prior(&network, 0)?;
+        let (val, train) = (self.splits.val.items(), self.splits.train.items());
+        // validation panoramas first: they say more; an auto-decoder has latents of the others only
+        let known = matches!(network, Network::Reni(_));
+        let val = if known { &[] } else { val };
+        let items: Vec<_> = val.iter().chain(train).take(PREVIEW_ROWS).cloned().collect();
+        let set = Dataset::new(self.splits.train.grid(), items);
+        let mut rng = stream(self.config.seed, Purpose::Preview, 0, 0);
+        let samples: Vec<_> = set.items().iter().map(|_| Latent::sample(&prior, &mut rng).vectors).collect();
+        let decoded = self.reconstructed(&network, &set, known)?;
+        let samples = decode(network.decoder(), set.grid(), &samples);
+        let rows: Vec<_> = (set.items().iter().zip(decoded.into_iter().zip(samples)))
+            .map(|(item, (reconstruction, sample))| vec![item.log_radiance.clone(), reconstruction, sample])
+            .collect();
+        let path = self.folder.join("preview").join(format!("step-{step:06}.png"));
+        preview::write(&path, set.grid(), &rows)?;
+        progress.wrote(&path);
+        Ok(())
+    }
+
+    /// The last validation and preview, then the best model again with the full prior.
+    pub(super) fn finish(&mut self, log: &mut MetricsLog, progress: &mut dyn Progress) -> Result<()> {
+        self.validate(log, progress)?;
+        self.preview(progress)?;
+        if let Network::Reni(_) = self.network {
+            // its prior has no copies to wait for
+            return Ok(());
+        }
+        let path = self.folder.join("model.safetensors");
+        let model = Model::load(&path)?;
+        let step = model.info().training.as_ref().map_or(self.steps_done(), |t| t.steps);
+        // from here on the file is complete, and stays: the stored weights, not the last ones
+        let veni = Veni::from_model(&model, &self.config.device.device()?)?;
+        self.store(&Network::Veni(veni), self.config.report.prior_copies, step, progress)
+    }
+}
+
+fn views(items: &[crate::data::Item]) -> Vec<&[f32]> {
+    items.iter().map(|item| item.log_radiance.as_slice()).collect()
+}
+
+/// Latents optimised for panoramas that the table does not know, from zero.
+fn fitted(
+    decoder: &Decoder,
+    grid: Equirect,
+    images: &[&[f32]],
+    config: &LatentsConfig,
+) -> Result<Vec<Latent>> {
+    let (factor, n) = (config.validation_factor, decoder.latent_vectors());
+    let coarse: Vec<_> = images.iter().map(|image| averaged(grid, image, factor)).collect();
+    let coarse: Vec<_> = coarse.iter().map(Vec::as_slice).collect();
+    let mut latents = Vec::with_capacity(images.len());
+    // a few at a time: the graph of a fit holds every activation of its images
+    for images in coarse.chunks(4) {
+        let target = FitTarget { grid: coarse_grid(grid, factor), directions: None, images, masks: None };
+        let start = vec![Latent::new(vec![[0.0; 3]; n]); images.len()];
+        latents.extend(fit(decoder, &target, &start, &config.validation)?.latents);
+    }
+    Ok(latents)
+}
+
+/// A panorama's row: its mean, with its scale as the log exposure, and the variance of each vector (the mean over its
+/// coordinates).
+struct TableRow {
+    latent: Latent,
+    variances: Vec<f32>,
+}
+
+fn table_rows(table: &LatentTable) -> Vec<TableRow> {
+    let values = weights::read(table, "");
+    let n = values["mean"].shape[1];
+    let rows = values["mean"].data.chunks_exact(3 * n).zip(values["log_variance"].data.chunks_exact(3 * n));
+    rows.enumerate()
+        .map(|(i, (mean, log_variance))| {
+            let latent = Latent::new(mean.as_chunks().0.to_vec());
+            let log_exposure = values.get("scale").map_or(0.0, |scale| scale.data[i]);
+            let variance = |l: &[f32; 3]| l.iter().map(|l| l.exp()).sum::<f32>() / 3.0;
+            TableRow {
+                latent: Latent { log_exposure, ..latent },
+                variances: log_variance.as_chunks().0.iter().map(variance).collect(),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,16 @@
+//! From the output map to log radiance.
+
+use crate::model::{DecoderConfig, OutputForm};
+use burn::tensor::Tensor;
+
+/// Log radiance of the output map's y [B, R, 3].
+pub(super) fn log_radiance(config: &DecoderConfig, y: Tensor<3>) -> Tensor<3> {
+    match config.output {
+        OutputForm::Linear => y,
+        OutputForm::Sine => (y * config.omega).sin(),
+        OutputForm::Tanh => {
+            let [least, most] = OutputForm::TANH_RANGE;
+            (y.tanh() + 1.0) * (0.5 * (most - least)) + least
+        }
+    }
+}
