@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use veni_core::eval::codec::Codec;
 use veni_core::eval::lpips::{self, Lpips};
 use veni_core::eval::protocol::paper::{self, Published};
 use veni_core::eval::protocol::{
@@ -73,6 +74,10 @@ pub(crate) struct Evaluate {
     #[arg(long, value_name = "FILE", num_args = 1..)]
     lpips: Vec<PathBuf>,
 
+    /// Bases of as many numbers as the models have, fitted to each panorama, as rows of reconstruction tables
+    #[arg(long, value_enum, num_args = 1.., default_values_t = [BaselineName::Sh, BaselineName::Sg])]
+    baselines: Vec<BaselineName>,
+
     /// Fewer steps, pixels and pairs: a trend in minutes
     #[arg(long)]
     quick: bool,
@@ -123,6 +128,19 @@ pub(crate) enum Protocol {
     Paper,
 }
 
+/// Classical bases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BaselineName {
+    /// No baseline
+    None,
+    /// Spherical harmonics of log radiance, weighted least squares
+    Sh,
+    /// Spherical Gaussians of either sign in log radiance
+    Sg,
+    /// A mixture of positive spherical Gaussians in radiance
+    Mixture,
+}
+
 /// How tables are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TableFormat {
@@ -163,9 +181,11 @@ impl Evaluate {
         let (store, figures, bars) = (Store::new(&self.out), self.out.join("figures"), Bars::new(report));
         let settings =
             Settings { seed: self.seed, quick: self.quick, pairs: self.pairs, frames: self.frames };
+        let bases = inputs::bases(&self.baselines, &subjects)?;
+        let others: Vec<&dyn Codec> = bases.iter().map(|basis| basis as &dyn Codec).collect();
         let evaluation = Evaluation {
             subjects: &subjects,
-            others: &[],
+            others: &others,
             data: &data,
             lpips: lpips.as_ref(),
             settings,

@@ -3,6 +3,7 @@
 mod completed;
 mod input;
 mod settings;
+mod shaded;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -12,7 +13,7 @@ use clap::Args;
 use serde_json::json;
 use veni_core::eval::metrics::{Alignment, Scores, scores};
 use veni_core::field;
-use veni_core::fit::{Best, FitConfig, Observation, best_of, random_starts};
+use veni_core::fit::{Best, FitConfig, Observation, best_of, fit_shaded, random_starts};
 use veni_core::latent::{Latent, Prior};
 use veni_core::output::Overwrite;
 use veni_core::sphere::Equirect;
@@ -28,21 +29,27 @@ use crate::source::{self, Loaded};
 
 pub(crate) use input::Input;
 use settings::{Settings, Start};
+use shaded::Shaded;
 
-/// Find the latent of a panorama, of a part of one, or of a photograph
+/// Find the latent of a panorama, a part of one, a photograph, or the light on a surface
 #[derive(Args, Debug)]
 #[command(
-    long_about = "Find the latent of a panorama, of a part of one, or of a photograph, by optimisation.\n\n\
+    long_about = "Find the latent of a panorama, a part of one, a photograph, or the light on a surface, by \
+        optimisation.\n\n\
         A panorama is OpenEXR, Radiance, PNG or JPEG, twice as wide as high, z up. Pixels that are not a number, \
         transparent, or black in --mask are unknown, and the latent completes them. With --fov the picture is a \
         photograph taken in the direction of --look. Values that a PNG or JPEG has clipped count as \"at least this \
         bright\". When part of the sphere is unknown, several starts are tried, the best is kept, and where they \
-        disagree the completion is uncertain.",
+        disagree the completion is uncertain.\n\n\
+        With --normals the picture shows a surface of known shape and material, whole or where --mask is white, and \
+        the latent is the light under which its rendering looks like the picture ('veni-cli render-probe' makes such \
+        pictures).",
     after_help = "Without -o and --out-dir the latent itself goes to stdout, one line of JSON per picture.\n\n\
         Examples:\n  \
         veni-cli fit sky.exr -o sky.json\n  \
         veni-cli fit half.exr --mask known.png -o sky.json --completed whole.exr --uncertainty doubt.png\n  \
         veni-cli fit photo.jpg --fov 65 --look 90,10 -o sky.json --completed whole.exr\n  \
+        veni-cli fit ball.exr --normals n.exr --mask m.png --ks 0.2 -o light.json --completed light.exr\n  \
         veni-cli fit sky.exr --preset display -o sky.json && veni-cli bake sky.json -o again.exr"
 )]
 pub(crate) struct Fit {
@@ -75,6 +82,9 @@ pub(crate) struct Fit {
     settings: Settings,
 
     #[command(flatten)]
+    shaded: Shaded,
+
+    #[command(flatten)]
     model: ModelArgs,
 
     #[command(flatten)]
@@ -92,8 +102,9 @@ struct Fitting<'a> {
 
 /// One picture's fit.
 pub(crate) struct Fitted {
-    observation: Observation,
     best: Best,
+    /// The share of the sphere that is known; nothing of it for the light on a surface.
+    known: Option<f32>,
     /// Only of whole panoramas.
     scores: Option<Scores>,
     seconds: f64,
@@ -153,9 +164,14 @@ impl Fit {
     ) -> Result<()> {
         let overwrite = Overwrite::from(self.force);
         let picture = self.input.read(path, report)?;
-        let grid = self.settings.grid(picture.is_partial())?;
-        let observation = self.input.observe(&picture, grid).map_err(|e| e.in_file(path))?;
-        let mut fitted = self.fit(path, observation, fitting, config, report)?;
+        let mut fitted = match &self.shaded.normals {
+            Some(normals) => self.fit_light(path, normals, &picture, fitting, config, report)?,
+            None => {
+                let grid = self.settings.grid(picture.is_partial())?;
+                let observation = self.input.observe(&picture, grid).map_err(|e| e.in_file(path))?;
+                self.fit(path, observation, fitting, config, report)?
+            }
+        };
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
         fitted.best.latent.source = Some(name.unwrap_or_else(|| path.display().to_string()));
         fitted.best.latent.model = Some(fitting.loaded.model.hash());
@@ -166,6 +182,7 @@ impl Fit {
             decoder: &fitting.decoder,
             picture: &picture,
             view: self.input.view(),
+            is_seen: self.shaded.normals.is_none(),
             size: self.size,
             overwrite,
         };
@@ -189,12 +206,7 @@ impl Fit {
         let started = Instant::now();
         let partial = observation.is_partial();
         let starts = self.starts(path, &observation, fitting)?;
-        if let Some(uncertainty) = self.uncertainty.as_ref().filter(|_| starts.len() < 2) {
-            bail!(
-                "{}: one start says nothing about uncertainty: give --starts 4 or more",
-                uncertainty.display()
-            );
-        }
+        self.check_starts(starts.len())?;
         let config = self.settings.adapted(*config, partial);
         let total = config.steps * starts.len() as u64;
         let mut progress = Progress::start(report, "step", 0, total);
@@ -214,7 +226,68 @@ impl Fit {
         for latent in best.all.iter_mut().chain([&mut best.latent]) {
             latent.log_exposure += observation.log_exposure;
         }
-        Ok(Fitted { observation, best, scores, seconds: started.elapsed().as_secs_f64() })
+        let known = Some(observation.share());
+        Ok(Fitted { best, known, scores, seconds: started.elapsed().as_secs_f64() })
+    }
+
+    /// The light on a surface.
+    fn fit_light(
+        &self,
+        path: &Path,
+        normals: &Path,
+        picture: &input::Read,
+        fitting: &Fitting<'_>,
+        config: &FitConfig,
+        report: Report,
+    ) -> Result<Fitted> {
+        let started = Instant::now();
+        let view = self.input.view();
+        let image = self.shaded.image(normals, self.input.mask(), picture, view)?;
+        let config = self.settings.for_light(*config);
+        let (start, count) = self.settings.start(false, false);
+        let n = fitting.decoder.latent_vectors();
+        let first = match start {
+            Start::Noise => None,
+            Start::Zero => Some(Latent::new(vec![[0.0; 3]; n])),
+            Start::Encoder => bail!(
+                "{}: the encoder needs a panorama, not a shaded picture: use --start zero or noise",
+                path.display()
+            ),
+        };
+        let rest = count - usize::from(first.is_some());
+        let random = random_starts(&fitting.prior, 0.0, rest, self.settings.seed());
+        let mut starts: Vec<_> = first.into_iter().chain(random).collect();
+        self.check_starts(starts.len())?;
+        self.shaded.exposed(&image, picture, &fitting.decoder, &mut starts)?;
+        let mut progress = Progress::start(report, "step", 0, config.steps * starts.len() as u64);
+        let image = [image];
+        let (mut all, mut losses) = (Vec::new(), Vec::new());
+        for (k, start) in starts.iter().enumerate() {
+            let before = k as u64 * config.steps;
+            let mut watch = |step, loss| progress.set(before + step, || format!("loss {loss:.4}"));
+            let start = std::slice::from_ref(start);
+            let found =
+                fit_shaded(&fitting.decoder, &image, Some(&fitting.prior), start, &config, &mut watch);
+            let found = found.map_err(|e| e.in_file(path))?;
+            all.extend(found.latents);
+            losses.extend(found.last);
+        }
+        progress.finish();
+        for latent in &mut all {
+            latent.log_exposure = self.shaded.recorded(latent.log_exposure);
+        }
+        let best = Best::of(all, losses);
+        Ok(Fitted { best, known: None, scores: None, seconds: started.elapsed().as_secs_f64() })
+    }
+
+    /// One start has nothing to disagree with.
+    fn check_starts(&self, starts: usize) -> Result<()> {
+        match &self.uncertainty {
+            Some(path) if starts < 2 => {
+                bail!("{}: one start says nothing about uncertainty: give --starts 4 or more", path.display())
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The latents to start from, at the exposure that the observation was brought to.
@@ -246,13 +319,13 @@ impl Fit {
     }
 
     fn print(&self, path: &Path, output: Option<&PathBuf>, fitted: &Fitted, report: Report) -> Result<()> {
-        let Fitted { observation, best, scores, seconds } = fitted;
+        let Fitted { best, known, scores, seconds } = fitted;
         let text = best.latent.to_json()?;
         if report.is_json() {
             let value = json!({
                 "picture": path.display().to_string(),
                 "output": output.map(|o| o.display().to_string()),
-                "known_share": observation.share(),
+                "known_share": known,
                 "loss": best.loss,
                 "losses": best.losses,
                 "ldr_psnr": scores.map(|s| s.psnr_ldr),
@@ -266,10 +339,10 @@ impl Fit {
         let Some(output) = output else { return to_stdout(format!("{text}\n").as_bytes()) };
         let stops = best.latent.log_exposure / std::f32::consts::LN_2;
         let n = best.latent.vectors.len();
-        let known = 100.0 * observation.share();
-        let quality = match scores {
-            Some(s) => format!("LDR PSNR {:.1} dB", s.psnr_ldr),
-            None => format!("{known:.0} % of the sphere known"),
+        let quality = match (scores, known) {
+            (Some(s), _) => format!("LDR PSNR {:.1} dB", s.psnr_ldr),
+            (None, Some(known)) => format!("{:.0} % of the sphere known", 100.0 * known),
+            (None, None) => "from a shaded surface".to_owned(),
         };
         let starts = match best.all.len() {
             1 => String::new(),

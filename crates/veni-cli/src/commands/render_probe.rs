@@ -258,11 +258,11 @@ fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     }
 }
 
-fn fraction(text: &str) -> Result<f32, String> {
+pub(crate) fn fraction(text: &str) -> Result<f32, String> {
     Ok(within(text, 0.0, 1.0)? as f32)
 }
 
-fn shininess(text: &str) -> Result<f32, String> {
+pub(crate) fn shininess(text: &str) -> Result<f32, String> {
     Ok(within(text, 0.0, 1e6)? as f32)
 }
 
@@ -274,7 +274,7 @@ fn elevation(text: &str) -> Result<f64, String> {
     within(text, -90.0, 90.0)
 }
 
-fn albedo(text: &str) -> Result<[f32; 3], String> {
+pub(crate) fn albedo(text: &str) -> Result<[f32; 3], String> {
     let values = text.split(',').map(fraction).collect::<Result<Vec<_>, _>>()?;
     match values[..] {
         [grey] => Ok([grey; 3]),
@@ -283,7 +283,7 @@ fn albedo(text: &str) -> Result<[f32; 3], String> {
     }
 }
 
-fn lights(text: &str) -> Result<usize, String> {
+pub(crate) fn lights(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {
         Ok(n) if (2..=MAX_LIGHTS).contains(&n) && n % 2 == 0 => Ok(n),
         _ => Err(format!("give an even width from 2 to {MAX_LIGHTS}; the height is half of it")),

@@ -1,8 +1,9 @@
 //! What a fit gives.
 
-use super::Space;
-use super::gaussians::Gaussians;
+use super::gaussians::{Gaussians, Lobe};
 use super::harmonics::Harmonics;
+use super::{Baseline, Space};
+use crate::{Error, Result};
 
 /// Where an expansion of radiance itself falls below this share of its own mean over the sphere, it is held there: such
 /// expansions ring below zero, which has no logarithm. A thousandth of the mean is black on any display.
@@ -43,7 +44,39 @@ impl Fitted {
         values.into_iter().map(log).collect()
     }
 
-    /// Every number that the field consists of, [`Baseline::dimension`](super::Baseline::dimension) of them. Harmonics:
+    /// The fit of `system` that [`Fitted::parameters`] of it describes.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if it is not [`Baseline::dimension`] numbers or one of them is not finite.
+    pub fn from_parameters(system: &Baseline, parameters: &[f64]) -> Result<Self> {
+        let (expected, given) = (system.dimension(), parameters.len());
+        if given != expected || parameters.iter().any(|v| !v.is_finite()) {
+            return Err(Error::invalid(format!(
+                "a baseline of {expected} numbers cannot be made from these {given}: each must be finite"
+            )));
+        }
+        let (triples, _) = parameters.as_chunks::<3>();
+        let field = match system {
+            Baseline::SphericalHarmonics { .. } => Field::Harmonics(Harmonics::new(triples.to_vec())?),
+            Baseline::SphericalGaussians { .. } | Baseline::GaussianMixture { .. } => {
+                let (constant, lobes) = triples.split_last().expect("a constant at least: checked above");
+                let lobe = |[place, amplitude]: &[[f64; 3]; 2]| {
+                    let [theta, phi, log_sharpness] = *place;
+                    let ((st, ct), (sp, cp)) = (theta.sin_cos(), phi.sin_cos());
+                    Lobe {
+                        axis: [st * cp, st * sp, ct],
+                        sharpness: log_sharpness.exp(),
+                        amplitude: *amplitude,
+                    }
+                };
+                let lobes = lobes.as_chunks::<2>().0.iter().map(lobe).collect();
+                Field::Gaussians(Gaussians { lobes, constant: *constant })
+            }
+        };
+        Ok(Self { space: system.space(), field })
+    }
+
+    /// Every number that the field consists of, [`Baseline::dimension`] of them. Harmonics:
     /// per function red, green, blue. Gaussians: per lobe θ and φ of the axis, ln λ, and the amplitude's red, green,
     /// blue; then the constant's.
     pub fn parameters(&self) -> Vec<f64> {

@@ -124,3 +124,19 @@ fn what_cannot_be_fitted_is_refused() {
         assert!(none.to_string().contains(word), "{none}");
     }
 }
+
+#[test]
+fn parameters_say_everything_about_a_fit() {
+    let grid = Equirect::new(16, 8);
+    let sky: Vec<f32> = grid.directions().iter().flat_map(|d| [d[2], 0.5 * d[0] * d[1], 1.0]).collect();
+    let directions = grid.directions();
+    for kind in [Kind::SphericalHarmonics, Kind::SphericalGaussians, Kind::GaussianMixture] {
+        let system = Baseline::from_dimension(kind, 27, Space::Log).unwrap();
+        let fitted = system.fit(grid, &sky).unwrap();
+        let again = Fitted::from_parameters(&system, &fitted.parameters()).unwrap();
+        let (a, b) = (fitted.log_radiance(&directions), again.log_radiance(&directions));
+        let apart = a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f32::max) < 1e-5, "{kind:?}");
+        assert!(Fitted::from_parameters(&system, &fitted.parameters()[1..]).is_err());
+    }
+}

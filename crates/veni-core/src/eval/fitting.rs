@@ -8,7 +8,6 @@ use crate::data::coarsen::{averaged, coarse_grid};
 use crate::fit::{self, FitConfig, FitResult, FitTarget};
 use crate::latent::Latent;
 use crate::sphere::Equirect;
-use crate::train::schedule::{LearningRate, Ramp};
 
 /// How a latent is fitted to an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,8 +22,7 @@ impl FitSettings {
     /// Solid-angle-weighted log error, 400 steps on a quarter of the pixels; `quick`: 100 steps on a sixteenth.
     pub fn thorough(grid: Equirect, quick: bool) -> Self {
         let config = FitConfig::thorough();
-        let config =
-            if quick { FitConfig { steps: 100, learning_rate: falling(100), ..config } } else { config };
+        let config = if quick { config.in_steps(100) } else { config };
         Self { config, factor: dividing(grid, if quick { 4 } else { 2 }) }
     }
 
@@ -65,14 +63,12 @@ impl FitSettings {
         let images: Vec<_> = images.iter().map(|image| averaged(grid, image, self.factor)).collect();
         let images: Vec<_> = images.iter().map(Vec::as_slice).collect();
         let grid = coarse_grid(grid, self.factor);
-        let target = FitTarget { grid, directions: None, images: &images, masks: None };
-        fit::fit(subject.network(), &target, start, &self.config)
+        let target = FitTarget::panoramas(grid, &images);
+        match subject.field() {
+            Some(field) => fit::fit(field, &target, start, &self.config),
+            None => fit::fit(subject.network(), &target, start, &self.config),
+        }
     }
-}
-
-/// The rates of [`FitConfig::thorough`], falling in so many steps.
-fn falling(steps: u64) -> LearningRate {
-    LearningRate::Exponential { rate: 5e-2, last: 2e-3, steps, warm_up: 0, before: 0.0, ramp: Ramp::Cosine }
 }
 
 /// The largest of `most`, `most`/2, … that divides both sides.

@@ -53,6 +53,17 @@ pub fn best_of<'a>(
         all.extend(latents);
         losses.extend(last);
     }
-    let best = (0..all.len()).min_by(|a, b| losses[*a].total_cmp(&losses[*b])).unwrap_or(0);
-    Ok(Best { latent: all[best].clone(), loss: losses[best], all, losses })
+    Ok(Best::of(all, losses))
+}
+
+impl Best {
+    /// The best of these.
+    ///
+    /// # Panics
+    /// If there is none, or not one loss for each.
+    pub fn of(all: Vec<Latent>, losses: Vec<f64>) -> Self {
+        assert!(!all.is_empty() && all.len() == losses.len(), "a loss for each of at least one latent");
+        let best = (0..all.len()).min_by(|a, b| losses[*a].total_cmp(&losses[*b])).unwrap_or(0);
+        Self { latent: all[best].clone(), loss: losses[best], all, losses }
+    }
 }

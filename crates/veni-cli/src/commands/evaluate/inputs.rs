@@ -5,11 +5,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use veni_core::Error;
+use veni_core::baseline::Kind;
 use veni_core::data::panorama_files;
+use veni_core::eval::codec::Basis;
 use veni_core::eval::subject::Subject;
 use veni_core::output::{Overwrite, write_atomic};
 use veni_core::train::config::DeviceKind;
 
+use super::BaselineName;
 use crate::args::ModelArgs;
 use crate::output::{folder_of, with_remedy, writable};
 use crate::source;
@@ -38,6 +41,26 @@ pub(super) fn subjects(models: &[String], device: DeviceKind) -> Result<Vec<Subj
         Ok(Subject::new(name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?)
     };
     given.into_iter().map(load).collect()
+}
+
+/// The bases asked for, of each size that a model has.
+pub(super) fn bases(names: &[BaselineName], subjects: &[Subject]) -> Result<Vec<Basis>> {
+    let mut sizes: Vec<_> = subjects.iter().map(Subject::dimension).collect();
+    sizes.sort_unstable();
+    sizes.dedup();
+    let mut bases = Vec::new();
+    for name in names {
+        let kind = match name {
+            BaselineName::None => continue,
+            BaselineName::Sh => Kind::SphericalHarmonics,
+            BaselineName::Sg => Kind::SphericalGaussians,
+            BaselineName::Mixture => Kind::GaussianMixture,
+        };
+        for size in &sizes {
+            bases.push(Basis::new(kind, *size)?);
+        }
+    }
+    Ok(bases)
 }
 
 /// `NAME=FILE`, or a file that is named after itself (a run after its folder).

@@ -26,6 +26,8 @@ pub(super) struct Images<'a> {
     pub(super) decoder: &'a field::Decoder,
     pub(super) picture: &'a Read,
     pub(super) view: Option<View>,
+    /// Whether the picture shows the panorama, or a surface lit by it.
+    pub(super) is_seen: bool,
     pub(super) size: Option<Size>,
     pub(super) overwrite: Overwrite,
 }
@@ -37,8 +39,8 @@ impl Images<'_> {
                 let (width, height) = size.equirect()?;
                 [width, height]
             }
-            (None, None) => self.picture.size,
-            (None, Some(_)) => GRID,
+            (None, None) if self.is_seen => self.picture.size,
+            _ => GRID,
         };
         Ok(Equirect::new(width, height))
     }
@@ -47,6 +49,9 @@ impl Images<'_> {
     pub(super) fn completed(&self, path: &Path, latent: &Latent) -> Result<()> {
         let grid = self.grid()?;
         let mut pixels = self.decoder.condition(latent)?.bake(grid);
+        if !self.is_seen {
+            return self.write(path, &Panorama::new(grid, pixels));
+        }
         let (known, seen) = self.seen(grid);
         for ((pixel, known), seen) in pixels.iter_mut().zip(&known).zip(&seen) {
             for (p, s) in pixel.iter_mut().zip(seen) {

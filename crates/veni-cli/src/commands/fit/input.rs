@@ -57,6 +57,10 @@ impl Input {
         self.fov.map(|fov| View { fov: fov.to_radians(), azimuth, elevation, roll })
     }
 
+    pub(super) fn mask(&self) -> Option<&Path> {
+        self.mask.as_deref()
+    }
+
     pub(super) fn read(&self, path: &Path, report: Report) -> Result<Read> {
         let mut read = match limited_range(path)? {
             Some(format) => Read::limited(path, format)?,

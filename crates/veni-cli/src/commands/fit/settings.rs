@@ -13,6 +13,8 @@ use crate::size::Size;
 const STARTS: usize = 4;
 /// Weight of the prior there: what is unknown has nothing else to go by.
 const PRIOR: f64 = 0.02;
+/// The same for the light on a surface.
+const LIGHT_PRIOR: f64 = 1e-4;
 /// A plateau: so many steps in which the loss falls by less than this fraction.
 const PLATEAU: Plateau = Plateau { patience: 50, improvement: 1e-3 };
 
@@ -162,6 +164,16 @@ impl Settings {
             _ => config.prior,
         };
         let free_exposure = self.exposure.map_or(partial, |e| e == Exposure::Free);
+        FitConfig { prior, free_exposure, ..config }
+    }
+
+    /// For the light on a surface, whose loss is a robust one of log radiance.
+    pub(super) fn for_light(&self, config: FitConfig) -> FitConfig {
+        let prior = match (self.prior, self.preset) {
+            (None, Preset::Thorough | Preset::Display) => LIGHT_PRIOR,
+            _ => config.prior,
+        };
+        let free_exposure = self.exposure.is_none_or(|e| e == Exposure::Free);
         FitConfig { prior, free_exposure, ..config }
     }
 

@@ -49,5 +49,5 @@ pub(super) fn seeded(seed: u64, model: &ModelArgs, grid: Equirect, turn: f64) ->
 }
 
 fn decode(loaded: &Loaded, latent: &Latent, grid: Equirect, turn: f64) -> Result<Vec<[f32; 3]>> {
-    Ok(loaded.model.decoder().condition(&latent.turned(turn))?.bake(grid))
+    Ok(loaded.model.decoder()?.condition(&latent.turned(turn))?.bake(grid))
 }

@@ -1,10 +1,12 @@
 //! Ways to code a panorama in D numbers and to get it back: what reconstruction compares.
 //!
-//! Every row of a reconstruction table is a [`Codec`]. A model's two are here; a classical basis (spherical harmonics,
-//! spherical Gaussians) becomes one by its own implementation, in a file of its own beside these.
+//! Every row of a reconstruction table is a [`Codec`]. A model's two passes are one each, a classical basis is
+//! one.
 
+mod basis;
 pub(crate) mod model;
 
+pub use basis::Basis;
 pub use model::{Autoencoder, Optimised};
 
 use serde_json::Value;

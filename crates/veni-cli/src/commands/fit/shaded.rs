@@ -1,0 +1,183 @@
+//! A picture of a surface of known shape: the light on it.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use clap::{Args, ValueEnum};
+use veni_core::field;
+use veni_core::latent::Latent;
+use veni_core::panorama;
+use veni_core::shade::{
+    Camera, Colour, ExposureForm, Lights, Material, NormalMap, ShadedImage, ShadedLoss, ShadingForm, Surface,
+    Transfer, read_albedo, read_mask,
+};
+use veni_core::sphere::{Equirect, View};
+
+use super::input::Read;
+use crate::commands::render_probe::{albedo, fraction, lights, shininess};
+use crate::output::CAMERA;
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Shaded pictures")]
+pub(super) struct Shaded {
+    /// The picture shows a surface with these normals (world axes, z up, as 'render-probe --normals' writes them):
+    /// find the light on it
+    #[arg(long, value_name = "NORMALS", requires = "output")]
+    pub(super) normals: Option<PathBuf>,
+
+    /// Albedo of the surface: one number or three, 0 to 1
+    #[arg(long, value_name = "R[,G,B]", default_value = "1", value_parser = albedo, requires = "normals")]
+    albedo: [f32; 3],
+
+    /// Albedo of every pixel (.exr, .hdr: linear; .png: sRGB)
+    #[arg(long, value_name = "IMAGE", requires = "normals", conflicts_with = "albedo")]
+    albedo_map: Option<PathBuf>,
+
+    /// Specular fraction K_s, 0 to 1; the diffuse rest is (1 - K_s) x albedo
+    #[arg(long, value_name = "KS", default_value = "0", value_parser = fraction, requires = "normals")]
+    ks: f32,
+
+    /// Exponent of the highlight
+    #[arg(long, value_name = "S", default_value = "500", value_parser = shininess, requires = "normals")]
+    shininess: f32,
+
+    /// Width of the panorama of lights
+    #[arg(long, value_name = "W", default_value = "64", value_parser = lights, requires = "normals")]
+    lights: usize,
+
+    /// How light and surface make the picture
+    #[arg(long, value_enum, default_value_t, requires = "normals")]
+    shading: Shading,
+}
+
+/// Physics, or the authors' program.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Shading {
+    /// Radiance x reflectance x cosine x solid angle; robust error of log radiance
+    #[default]
+    Physical,
+    /// The authors': no solid angles, exposure exponentiated twice, 100 x mean absolute log error
+    Reference,
+}
+
+impl Shaded {
+    /// The picture as a function of the light on it.
+    pub(super) fn image(
+        &self,
+        normals: &Path,
+        mask: Option<&Path>,
+        picture: &Read,
+        view: Option<View>,
+    ) -> Result<ShadedImage> {
+        let map = NormalMap::read(normals)?;
+        let sizes = |path: &Path, size: [usize; 2]| -> Result<()> {
+            if size != picture.size {
+                let [[w, h], [pw, ph]] = [size, picture.size];
+                bail!("{}: is {w} x {h}, the picture {pw} x {ph}: they must have one size", path.display());
+            }
+            Ok(())
+        };
+        sizes(normals, map.size())?;
+        let mask = match mask {
+            Some(path) => {
+                let (size, mask) = read_mask(path)?;
+                sizes(path, size)?;
+                Some(mask)
+            }
+            None => None,
+        };
+        let rays = self.rays(normals, &map, view)?;
+        let surface = Surface::new(map.size(), map.normals(), &rays, mask.as_deref())
+            .map_err(|e| e.in_file(normals))?;
+        let colour = match &self.albedo_map {
+            Some(path) => {
+                let (size, colours) = read_albedo(path)?;
+                sizes(path, size)?;
+                Colour::Map(colours)
+            }
+            None => Colour::Uniform(self.albedo),
+        };
+        let material = match self.ks {
+            0.0 => Material::lambert(colour),
+            ks => Material::blinn_phong(colour, ks, self.shininess),
+        };
+        let grid = Equirect::new(self.lights, self.lights / 2);
+        let (lights, form, loss, exposure) = match self.shading {
+            Shading::Physical => {
+                (Lights::equirect(grid), ShadingForm::Physical, ShadedLoss::default(), ExposureForm::Natural)
+            }
+            Shading::Reference => (
+                Lights::new(&grid.directions(), &vec![1.0; grid.len()])?,
+                ShadingForm::Reference,
+                ShadedLoss::ReferenceLog,
+                ExposureForm::Reference,
+            ),
+        };
+        let transfer = Transfer::new(&surface, &material, lights, form)?;
+        Ok(ShadedImage::new(transfer, &picture.pixels, loss)?.with_exposure(exposure))
+    }
+
+    /// From the camera that the normals' file names, or from --fov and --look.
+    fn rays(&self, normals: &Path, map: &NormalMap, view: Option<View>) -> Result<Vec<[f32; 3]>> {
+        let [width, height] = map.size();
+        if let Some(view) = view {
+            return Ok(view.pixels(width, height).0);
+        }
+        // a PNG has no such attribute
+        if let Ok(attributes) = panorama::attributes(normals)
+            && let Some(camera) = attributes.get(CAMERA)
+        {
+            return Ok(Camera::from_json(camera).map_err(|e| e.in_file(normals))?.rays(width, height));
+        }
+        if self.ks > 0.0 {
+            bail!(
+                "{}: does not say where the camera was, on which highlights depend: give --fov and --look",
+                normals.display()
+            );
+        }
+        // a dull surface looks alike from everywhere
+        let against = |n: &[f32; 3]| {
+            if n.iter().all(|c| *c == 0.0) { [0.0, 0.0, -1.0] } else { n.map(|c| -c) }
+        };
+        Ok(map.normals().iter().map(against).collect())
+    }
+
+    /// Brings each start to the picture's mean brightness; the authors' starts stay where they are.
+    pub(super) fn exposed(
+        &self,
+        image: &ShadedImage,
+        picture: &Read,
+        decoder: &field::Decoder,
+        starts: &mut [Latent],
+    ) -> Result<()> {
+        if self.shading == Shading::Reference {
+            return Ok(());
+        }
+        let directions = image.transfer().lights().directions();
+        let mut light = vec![[0.0; 3]; directions.len()];
+        for start in starts {
+            decoder.condition(start)?.log_radiance_batch(directions, &mut light);
+            let rendering = image.render(&light, 0.0);
+            let (mut seen, mut rendered) = (0.0f64, 0.0f64);
+            for (target, found) in picture.pixels.iter().zip(&rendering) {
+                let counts = target.iter().all(|v| v.is_finite()) && found.iter().any(|v| *v > 0.0);
+                if counts {
+                    seen += target.iter().map(|v| f64::from(*v)).sum::<f64>();
+                    rendered += found.iter().map(|v| f64::from(*v)).sum::<f64>();
+                }
+            }
+            if seen > 0.0 && rendered > 0.0 {
+                start.log_exposure += (seen / rendered).ln() as f32;
+            }
+        }
+        Ok(())
+    }
+
+    /// The log exposure that a latent file records for the image's own number.
+    pub(super) fn recorded(&self, exposure: f32) -> f32 {
+        match self.shading {
+            Shading::Physical => exposure,
+            Shading::Reference => exposure.exp(),
+        }
+    }
+}
