@@ -213,7 +213,7 @@ fn bad_input_is_explained() {
     dir.refused(&["render-probe", "cube.exr", "-o", "a.exr"], &["cube.exr", "cube map"]);
     for (args, word) in [
         (vec!["--albedo", "1.5"], "between 0 and 1"),
-        (vec!["--ks", "-0.1"], "--ks"),
+        (vec!["--ks=-0.1"], "between 0 and 1"),
         (vec!["--lights", "7"], "even"),
         (vec!["--elevation", "100"], "between -90 and 90"),
         (vec!["--seed", "1"], "cannot be used with"),
