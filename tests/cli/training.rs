@@ -99,6 +99,20 @@ fn an_auto_decoder_is_trained_by_the_same_command() {
 }
 
 #[test]
+fn an_option_of_the_decoder_is_trained_shown_and_refused_where_it_cannot_serve() {
+    let dir = Dir::new();
+    let data = text(panoramas());
+    let set = ["--set", "model.decoder.conditioning=tokens", "--set", "model.decoder.invariance=gram-matrix"];
+    dir.ok(&[&train_args(&data, "run", "2")[..], &set].concat());
+    let shown = dir.ok(&["inspect", "run/model.safetensors"]);
+    assert!(shown.contains("conditioning tokens; invariance gram-matrix"), "{shown}");
+    for command in ["bake --seed 1 -o sky.exr", "sample -o sky.png"] {
+        let args: Vec<_> = command.split(' ').chain(["--model", "run"]).collect();
+        dir.refused(&args, &["model.safetensors", "decoder.conditioning = tokens"]);
+    }
+}
+
+#[test]
 fn seeds_decide_everything() {
     let dir = Dir::new();
     let data = text(panoramas());

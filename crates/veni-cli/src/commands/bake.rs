@@ -138,6 +138,7 @@ impl Bake {
         let picture = Picture::new(self.layout, self.frame, self.size)?;
         let loaded = source::model(&self.model)?;
         let model = &loaded.model;
+        model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
         let device = Device::open(self.device, model, report)?;
         let named = match (&self.latent, self.seed) {
             (Some(path), _) => source::from_file(path, &loaded, report)?,

@@ -117,7 +117,8 @@ impl<'a> Encoding<'a> {
             model: Some(self.loaded.model.hash()),
             source: Some(name.unwrap_or_else(|| path.display().to_string())),
         };
-        let field = self.loaded.model.decoder()?.condition(&latent).map_err(|e| e.in_file(path))?;
+        let decoder = self.loaded.model.decoder().map_err(|e| e.in_file(&self.loaded.name))?;
+        let field = decoder.condition(&latent).map_err(|e| e.in_file(path))?;
         let mut decoded = vec![[0.0; 3]; grid.len()];
         field.log_radiance_batch(&grid.directions(), &mut decoded);
         let prediction: Vec<f32> = decoded.as_flattened().iter().map(|v| v - item.log_exposure).collect();

@@ -117,7 +117,8 @@ impl Sample {
             bail!("--seed {}: leaves no room for {count} seeds; give a smaller one", self.seed);
         };
         let files = self.latent_files(last, overwrite)?;
-        let Loaded { model, .. } = source::model(&self.model)?;
+        let Loaded { model, name } = source::model(&self.model)?;
+        model.config().decoder.check_folds().map_err(|e| e.in_file(&name))?;
         let device = Device::open(self.device, &model, report)?;
         let cell = Equirect::new(width, height);
         let mut sheet = Sheet::new(grid.columns, grid.rows, width, height);

@@ -235,18 +235,25 @@ impl DecoderConfig {
     /// [`Error::Unsupported`] naming the option that differs.
     pub fn check_folds(&self) -> Result<()> {
         let paper = Self::default();
-        let differs = |name: &str, value: &dyn std::fmt::Debug| {
+        let differs = |name: &str, value: serde_json::Result<serde_json::Value>| {
+            let value = value.ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
             Err(Error::unsupported(format!(
-                "decoder.{name} = {value:?}: only the paper's network (attention, VN, SO(2)) is decoded here; use the \
-                 learning world's decoder (feature `learn`)"
+                "decoder.{name} = {value}: only the paper's network (attention, vn, so2) is baked; this one is for \
+                 training and comparison"
             )))
         };
         match self {
-            c if c.conditioning != paper.conditioning => differs("conditioning", &c.conditioning),
-            c if c.invariance != paper.invariance => differs("invariance", &c.invariance),
-            c if c.equivariance != paper.equivariance => differs("equivariance", &c.equivariance),
-            c if c.encoding != paper.encoding => differs("encoding", &c.encoding),
-            c if c.output != paper.output => differs("output", &c.output),
+            c if c.conditioning != paper.conditioning => {
+                differs("conditioning", serde_json::to_value(c.conditioning))
+            }
+            c if c.invariance != paper.invariance => {
+                differs("invariance", serde_json::to_value(c.invariance))
+            }
+            c if c.equivariance != paper.equivariance => {
+                differs("equivariance", serde_json::to_value(c.equivariance))
+            }
+            c if c.encoding != paper.encoding => differs("encoding", serde_json::to_value(c.encoding)),
+            c if c.output != paper.output => differs("output", serde_json::to_value(c.output)),
             _ => Ok(()),
         }
     }

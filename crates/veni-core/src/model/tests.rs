@@ -207,10 +207,10 @@ fn a_network_that_does_not_fold_is_refused_by_name() {
         let error = Model::filler(&config, 1).unwrap().decoder().unwrap_err();
         assert!(matches!(error, Error::Unsupported(_)) && error.to_string().contains(name), "{error}");
     };
-    refused(|c| c.conditioning = Conditioning::Film, "decoder.conditioning = Film");
-    refused(|c| c.conditioning = Conditioning::Tokens, "decoder.conditioning = Tokens");
-    refused(|c| c.invariance = Invariance::GramMatrix, "decoder.invariance = GramMatrix");
-    refused(|c| c.equivariance = Equivariance::So3, "decoder.equivariance = So3");
-    refused(|c| c.encoding = Encoding::Both, "decoder.encoding = Both");
-    refused(|c| c.output = OutputForm::Tanh, "decoder.output = Tanh");
+    refused(|c| c.conditioning = Conditioning::Film, "decoder.conditioning = film");
+    refused(|c| c.conditioning = Conditioning::Tokens, "decoder.conditioning = tokens");
+    refused(|c| c.invariance = Invariance::GramMatrix, "decoder.invariance = gram-matrix");
+    refused(|c| c.equivariance = Equivariance::So3, "decoder.equivariance = so3");
+    refused(|c| c.encoding = Encoding::Both, "decoder.encoding = both");
+    refused(|c| c.output = OutputForm::Tanh, "decoder.output = tanh");
 }

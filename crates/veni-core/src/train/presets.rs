@@ -7,7 +7,7 @@ use crate::train::config::{DeviceKind, GroupConfig, LossGrid, Order, ReportConfi
 use crate::train::latents::LatentsConfig;
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
-use crate::train::schedule::{LearningRate, WeightSchedule};
+use crate::train::schedule::{LearningRate, Ramp, WeightSchedule};
 use crate::{Error, Result};
 
 /// A named configuration.
@@ -53,7 +53,16 @@ impl Preset {
             Self::Small => (12_000, 200, 8, 4096),
             Self::Paper => (50_001, 500, 16, 8192),
         };
-        let fit = FitConfig { steps: if self == Self::Tiny { 20 } else { 200 }, ..FitConfig::thorough() };
+        let (fit, factor) = if self == Self::Tiny { (20, 1) } else { (150, 4) };
+        let falling = |steps| LearningRate::Exponential {
+            rate: 5e-2,
+            last: 2e-3,
+            steps,
+            warm_up: 0,
+            before: 0.0,
+            ramp: Ramp::Cosine,
+        };
+        let fit = FitConfig { steps: fit, learning_rate: falling(fit), ..FitConfig::thorough() };
         let off = WeightSchedule::Constant(0.0);
         let adam = AdamConfig { epsilon: 1e-15, clip: None, ..AdamConfig::default() };
         let group = || group(1e-3, [warm_up, steps], 0.05, adam);
@@ -74,7 +83,7 @@ impl Preset {
                 free_exposure: false,
                 validation: fit,
                 validation_panoramas: 8,
-                validation_factor: if self == Self::Tiny { 1 } else { 2 },
+                validation_factor: factor,
             }),
             report: ReportConfig {
                 validate_every: if self == Self::Tiny { 50 } else { steps / 10 },

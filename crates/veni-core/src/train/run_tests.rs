@@ -177,6 +177,33 @@ fn an_auto_decoder_learns_its_panoramas_and_leaves_its_table() {
 }
 
 #[test]
+fn every_way_to_condition_learns_in_both_systems() {
+    for conditioning in ["film", "concat", "tokens"] {
+        for config in [Preset::Tiny.config(3), Preset::Tiny.auto_decoder(3)] {
+            // the sines as their authors drive them: with plain inputs
+            let plain = if conditioning == "tokens" { "directions" } else { "none" };
+            let options = [
+                format!("model.decoder.conditioning={conditioning}"),
+                format!("model.decoder.encoding={plain}"),
+                "model.decoder.omega=10".to_owned(),
+                "report.validate_every=0".to_owned(),
+            ];
+            let mut config = config.with_overrides(&options).unwrap();
+            config.augment = crate::data::AugmentConfig::default();
+            let (folder, config) = setup_of(config, 60);
+            let out = folder.path().join("run");
+            complete(&mut Trainer::create(&out, config.clone(), "test").unwrap());
+            let losses: Vec<f64> = losses(&out).into_iter().filter_map(|(_, loss)| loss).collect();
+            let (first, last) = (losses[..5].iter().sum::<f64>(), losses[55..].iter().sum::<f64>());
+            let system = (conditioning, config.model.kind);
+            assert!(last < 0.9 * first, "{system:?}: {first} to {last}");
+            let model = Model::load(out.join("model.safetensors")).unwrap();
+            assert_eq!(model.config(), &config.model);
+        }
+    }
+}
+
+#[test]
 fn a_used_folder_and_a_damaged_checkpoint_are_refused() {
     let (folder, mut config) = setup(1);
     let out = folder.path().join("run");

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Result;
 use serde_json::{Value, json};
 use veni_core::Error;
-use veni_core::model::Model;
+use veni_core::model::{DecoderConfig, Model};
 
 use super::Facts;
 
@@ -23,11 +23,12 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     facts.add(
         "decoder",
         format!(
-            "{} parameters; {} layers of {}, {} heads",
+            "{} parameters; {} layers of {}, {} heads{}",
             parameters(&model, "decoder."),
             d.layers,
             d.hidden,
-            d.heads
+            d.heads,
+            options(d)
         ),
         json!({ "parameters": parameters(&model, "decoder."), "config": d }),
     );
@@ -67,6 +68,15 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     facts.add("licence", info.licence.clone().unwrap_or_else(|| "not stated".into()), json!(info.licence));
     facts.add("file size", format!("{:.2} MB", size as f64 / 1e6), size);
     Ok(facts)
+}
+
+/// The options that differ from the article's network, as they are written in a model file.
+fn options(decoder: &DecoderConfig) -> String {
+    let sizes = ["hidden", "layers", "heads", "vn_relu"];
+    let written = json!(decoder);
+    let differing =
+        written.as_object().into_iter().flatten().filter(|(name, _)| !sizes.contains(&name.as_str()));
+    differing.map(|(name, value)| format!("; {name} {}", value.to_string().trim_matches('"'))).collect()
 }
 
 fn parameters(model: &Model, prefix: &str) -> usize {
