@@ -203,3 +203,39 @@ fn what_cannot_be_fitted_is_refused_before_any_work() {
     refused(&[&sky, "--resolution", "32x32"], &["--resolution"]);
     mistyped(&dir, &[&sky, "--rate", "0"], "learning rate");
 }
+
+#[test]
+fn the_light_on_a_ball_is_found() {
+    let dir = Dir::new();
+    let ball = ["--size", "24", "--lights", "32", "--ks", "0.5", "--shininess", "50", "-q"];
+    let files = ["-o", "ball.exr", "--normals", "n.exr", "--mask", "m.png"];
+    dir.ok(&[&["render-probe", "--model", model(), "--seed", "5"], &files[..], &ball[..]].concat());
+    let surface = ["ball.exr", "--normals", "n.exr", "--mask", "m.png", "--ks", "0.5", "--shininess", "50"];
+    let all = [&surface[..], &["--lights", "32", "-o", "light.json", "--starts", "2"]].concat();
+    let found = fit(
+        &dir,
+        &[&all[..], &["--completed", "light.exr", "--uncertainty", "u.png", "--size", "64"]].concat(),
+    );
+    // 0.095 is the loss of a picture that is off by a factor of e everywhere
+    assert!(found["loss"].as_f64().unwrap() < 0.01, "{found}");
+    assert_eq!((&found["known_share"], &found["ldr_psnr"]), (&Value::Null, &Value::Null));
+    assert_eq!(readers::exr(&dir.path("light.exr")).pixels.len(), 64 * 32);
+    // the material matters: as a dull surface the picture is explained worse
+    let dull = ["ball.exr", "--normals", "n.exr", "--lights", "32", "-o", "dull.json", "--starts", "2"];
+    let dull = fit(&dir, &dull);
+    assert!(dull["loss"].as_f64() > found["loss"].as_f64(), "{dull} {found}");
+    // the authors' form runs too
+    let reference = fit(&dir, &[&all[..], &["--shading", "reference", "--force"]].concat());
+    assert!(reference["loss"].as_f64().unwrap().is_finite());
+
+    let refused = |args: &[&str], words: &[&str]| {
+        dir.refused(&[&["fit", "--model", model(), "-q", "-o", "x.json"], args].concat(), words);
+    };
+    refused(&["ball.exr", "--normals", "light.exr"], &["light.exr", "64 x 32"]);
+    refused(&["ball.exr", "--normals", "missing.exr"], &["missing.exr"]);
+    refused(&["ball.exr", "--normals", "n.exr", "--start", "encoder"], &["encoder"]);
+    // highlights need to know where the camera was; these normals do not say it
+    exr::prelude::write_rgb_file(dir.path("bare.exr"), 24, 24, |_, _| (0.0f32, 0.0f32, 1.0f32)).unwrap();
+    refused(&["ball.exr", "--normals", "bare.exr", "--ks", "0.5"], &["bare.exr", "--fov"]);
+    mistyped(&dir, &["ball.exr", "--ks", "0.5"], "--normals");
+}

@@ -12,7 +12,7 @@ use veni_core::eval::lpips::{self, Lpips};
 use veni_core::eval::protocol::paper::{self, Published};
 use veni_core::eval::protocol::{
     Evaluation, Report as Findings, Settings, ablations, consistency, dataset_size, equivariance,
-    interpolation, reconstruction, uniqueness,
+    interpolation, inverse_rendering, reconstruction, uniqueness,
 };
 use veni_core::eval::store::Store;
 use veni_core::eval::table::{Format, Table};
@@ -124,6 +124,8 @@ pub(crate) enum Protocol {
     DatasetSize,
     /// Models that differ in one part, side by side
     Ablations,
+    /// The light on a shaded ball, from dull to shiny
+    InverseRendering,
     /// All of them, with published numbers beside ours
     Paper,
 }
@@ -252,6 +254,7 @@ impl Protocol {
             Self::Equivariance => equivariance::run(evaluation),
             Self::DatasetSize => dataset_size::run(evaluation),
             Self::Ablations => ablations::run(evaluation),
+            Self::InverseRendering => inverse_rendering::run(evaluation),
             Self::Paper => paper::run(evaluation, published),
         }
     }

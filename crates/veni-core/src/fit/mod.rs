@@ -19,7 +19,7 @@ mod whole;
 pub use config::{FitConfig, Objective, Plateau};
 pub use network::FitDecoder;
 pub use observation::{Observation, Picture};
-pub use shaded::fit_shaded;
+pub use shaded::{fit_shaded, matching_exposure};
 pub use starts::{Best, best_of, random_starts};
 pub use target::FitTarget;
 

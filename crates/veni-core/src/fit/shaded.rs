@@ -36,6 +36,24 @@ pub fn fit_shaded<'a>(
     optimise(&network, &ImageLoss::Shaded(images), prior, start, config, watch)
 }
 
+/// The log exposure at which the rendering of light `log_radiance` is as bright, on average, as the picture `target` (both in
+/// the order of the image): where a fit of the light may start. 0 if either is black.
+///
+/// # Panics
+/// If there is not one log radiance per light.
+pub fn matching_exposure(image: &ShadedImage, target: &[[f32; 3]], log_radiance: &[[f32; 3]]) -> f32 {
+    let rendering =
+        image.transfer().render(&log_radiance.iter().map(|p| p.map(f32::exp)).collect::<Vec<_>>());
+    let (mut seen, mut rendered) = (0.0f64, 0.0f64);
+    for (target, found) in target.iter().zip(&rendering) {
+        if target.iter().all(|v| v.is_finite()) && found.iter().any(|v| *v > 0.0) {
+            seen += target.iter().map(|v| f64::from(*v)).sum::<f64>();
+            rendered += found.iter().map(|v| f64::from(*v)).sum::<f64>();
+        }
+    }
+    if seen > 0.0 && rendered > 0.0 { (seen / rendered).ln() as f32 } else { 0.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::tests::{decoder, latent, model};
@@ -75,6 +93,17 @@ mod tests {
         let found = fit_shaded(&decoder, &image, None, &[near], &config, &mut |_, _| calls += 1).unwrap();
         assert!(found.last[0] < 0.01 * found.losses[0], "{} of {}", found.last[0], found.losses[0]);
         assert!((found.latents[0].log_exposure - 0.4).abs() < 0.1 && calls == 200);
+    }
+
+    #[test]
+    fn brightness_is_matched_by_the_exposure() {
+        let image = ball(1, 0.4);
+        let field = model(&decoder()).decoder().unwrap().condition(&latent(1)).unwrap();
+        let mut light = vec![[0.0; 3]; 128];
+        field.log_radiance_batch(&Equirect::new(16, 8).directions(), &mut light);
+        let target = image.render(&light, 0.7);
+        assert!((matching_exposure(&image, &target, &light) - 0.7).abs() < 1e-4);
+        assert_eq!(matching_exposure(&image, &vec![[0.0; 3]; 400], &light), 0.0);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use veni_core::field;
+use veni_core::fit::matching_exposure;
 use veni_core::latent::Latent;
 use veni_core::panorama;
 use veni_core::shade::{
@@ -157,18 +158,7 @@ impl Shaded {
         let mut light = vec![[0.0; 3]; directions.len()];
         for start in starts {
             decoder.condition(start)?.log_radiance_batch(directions, &mut light);
-            let rendering = image.render(&light, 0.0);
-            let (mut seen, mut rendered) = (0.0f64, 0.0f64);
-            for (target, found) in picture.pixels.iter().zip(&rendering) {
-                let counts = target.iter().all(|v| v.is_finite()) && found.iter().any(|v| *v > 0.0);
-                if counts {
-                    seen += target.iter().map(|v| f64::from(*v)).sum::<f64>();
-                    rendered += found.iter().map(|v| f64::from(*v)).sum::<f64>();
-                }
-            }
-            if seen > 0.0 && rendered > 0.0 {
-                start.log_exposure += (seen / rendered).ln() as f32;
-            }
+            start.log_exposure += matching_exposure(image, &picture.pixels, &light);
         }
         Ok(())
     }

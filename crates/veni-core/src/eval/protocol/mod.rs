@@ -9,17 +9,17 @@
 //! | [`equivariance`] | does the latent turn with the panorama? |
 //! | [`dataset_size`] | what is more training data worth? |
 //! | [`ablations`] | what is each part of the model worth? |
+//! | [`inverse_rendering`] | what does a shaded ball tell of the light on it? |
 //! | [`paper`] | all of them, with published numbers beside ours |
 //!
 //! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image.
-//! A protocol that needs other inputs than models and panoramas (shading, say) is a function beside these with its own
-//! inputs; it shares tables, figures, store and progress.
 
 pub mod ablations;
 pub mod consistency;
 pub mod dataset_size;
 pub mod equivariance;
 pub mod interpolation;
+pub mod inverse_rendering;
 pub mod paper;
 mod quality;
 pub mod reconstruction;

@@ -9,8 +9,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    Evaluation, Report, ablations, consistency, dataset_size, equivariance, interpolation, reconstruction,
-    uniqueness,
+    Evaluation, Report, ablations, consistency, dataset_size, equivariance, interpolation, inverse_rendering,
+    reconstruction, uniqueness,
 };
 use crate::eval::table::{Cell, Column, Table};
 use crate::{Error, Result};
@@ -113,13 +113,14 @@ fn row_name(table: &Table, row: &[Cell]) -> String {
 /// As each protocol and [`Published::beside`].
 pub fn run(run: &Evaluation<'_>, published: &Published) -> Result<Report> {
     let mut report = Report::default();
-    let protocols: [fn(&Evaluation<'_>) -> Result<Report>; 6] = [
+    let protocols: [fn(&Evaluation<'_>) -> Result<Report>; 7] = [
         reconstruction::run,
         uniqueness::run,
         consistency::run,
         interpolation::run,
         equivariance::run,
         ablations::run,
+        inverse_rendering::run,
     ];
     for protocol in protocols {
         add(&mut report, protocol(run)?, published)?;

@@ -70,7 +70,7 @@ pub(super) fn reconstruct(run: &Evaluation<'_>, codec: &dyn Codec) -> Result<Rec
         Ok((decoded, quality))
     })?;
     let (images, each): (Vec<_>, Vec<_>) = results.into_iter().unzip();
-    let mean = Quality { reference: mean(&each, |q| q.reference), exposure: mean(&each, |q| q.exposure) };
+    let mean = Quality::mean(&each);
     Ok(Reconstructed { images, each, mean })
 }
 
@@ -87,7 +87,8 @@ pub(super) fn codes(run: &Evaluation<'_>, codec: &dyn Codec) -> Result<Vec<Vec<f
     kept(run, ("panorama", &task), &keys, |i| codec.encode(grid, &items[i].log_radiance))
 }
 
-fn rate(grid: Equirect, item: &Item, decoded: &[f32], lpips: Option<&Lpips>) -> Result<Quality> {
+/// Scores one reconstruction at exposure 0.
+pub(super) fn rate(grid: Equirect, item: &Item, decoded: &[f32], lpips: Option<&Lpips>) -> Result<Quality> {
     let stored = |image: &[f32]| image.iter().map(|v| v + item.log_exposure).collect::<Vec<_>>();
     let one =
         |prediction: &[f32], target: &[f32], alignment| score(grid, prediction, target, alignment, lpips);
@@ -129,6 +130,11 @@ fn mean(each: &[Quality], part: impl Fn(&Quality) -> Scored) -> Scored {
 }
 
 impl Quality {
+    /// Over panoramas.
+    pub(super) fn mean(each: &[Self]) -> Self {
+        Self { reference: mean(each, |q| q.reference), exposure: mean(each, |q| q.exposure) }
+    }
+
     /// One cell per column of [`COLUMNS`].
     pub(super) fn cells(&self) -> Vec<Cell> {
         let cells = |s: &Scored| {

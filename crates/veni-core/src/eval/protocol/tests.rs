@@ -310,3 +310,23 @@ fn identities_see_the_encoder_too() {
         evaluated(folder.path(), &[reni], &skies(1), quick(), |run| uniqueness::run(run).unwrap());
     assert!(report.tables[0].rows[0][2].number().unwrap().is_finite());
 }
+
+#[test]
+fn the_light_on_a_ball_is_found_from_the_picture_alone() {
+    let (folder, data, subjects) = (tempfile::tempdir().unwrap(), skies(2), [subject("tiny", 1)]);
+    let run =
+        || evaluated(folder.path(), &subjects, &data, quick(), |run| inverse_rendering::run(run).unwrap());
+    let (first, computed) = run();
+    assert_eq!(computed, 6, "two panoramas at three K_s");
+    let (again, computed) = run();
+    assert_eq!((computed, &again.tables), (0, &first.tables));
+    let rows = first.tables[0].rows.len();
+    assert_eq!((rows, first.details[0].rows.len()), (3, 6));
+    let loss = first.tables[0].columns.iter().position(|c| c.title == "loss of the picture").unwrap();
+    for row in &first.tables[0].rows {
+        let loss = row[loss].number().unwrap();
+        // 0.1 is the loss of a picture that is off by a factor of e everywhere
+        assert!((0.0..0.05).contains(&loss), "{loss}");
+    }
+    assert_eq!(first.figures.len(), 2);
+}
