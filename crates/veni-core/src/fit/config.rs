@@ -45,6 +45,7 @@ pub struct Plateau {
 /// others need the whole image before they know any pixel's gradient: one more pass forward.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[expect(clippy::large_enum_variant, reason = "there is one per fit, and it stays plain data")]
 pub enum Objective {
     /// Σ ω m (P − I)²/Σ ω m.
     LogError,

@@ -52,6 +52,7 @@ impl FitDecoder<'_> {
 
 /// The images' part of the objective.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one per fit")]
 pub(super) enum ImageLoss<'a> {
     /// One loss per image.
     Pixels(Vec<PixelLoss<'a>>),
@@ -74,6 +75,7 @@ pub(super) struct Evaluation {
 
 /// A decoder with the directions it is asked in.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one per fit")]
 pub(super) enum Network<'a> {
     Folded { decoder: &'a field::Decoder, directions: Vec<[f32; 3]>, device: Device },
     Graph { decoder: Box<vae::Decoder>, directions: Tensor<2>, device: Device },

@@ -84,7 +84,8 @@ mod tests {
         let config = FitConfig { prior: 0.0, free_exposure: true, steps: 200, ..FitConfig::thorough() };
         let truth = Latent { log_exposure: 0.4, ..latent(1) };
         let none = FitConfig { steps: 0, ..config };
-        let exact = fit_shaded(&decoder, &image, None, &[truth.clone()], &none, &mut |_, _| {}).unwrap();
+        let exact =
+            fit_shaded(&decoder, &image, None, std::slice::from_ref(&truth), &none, &mut |_, _| {}).unwrap();
         assert!(exact.last[0] < 1e-9, "{}", exact.last[0]);
         let mut near = truth;
         near.vectors.as_flattened_mut().iter_mut().for_each(|v| *v += 0.05);

@@ -127,7 +127,7 @@ fn the_number_of_threads_changes_no_bit_and_no_direction_is_lost() {
     assert_eq!(with(1), with(3));
     // summed by hand, one at a time
     let field = model.decoder().unwrap().condition(&latent).unwrap();
-    let mut sum = vec![[0.0f64; 3]; 3];
+    let mut sum = [[0.0f64; 3]; 3];
     for (i, d) in directions.iter().enumerate() {
         let one = field.gradient(std::slice::from_ref(d), |_, p| {
             let (value, slope) = loss(i, p.map(f64::from));

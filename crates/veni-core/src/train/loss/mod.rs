@@ -139,7 +139,7 @@ impl Loss {
         };
         let mage = (!config.mage.is_off())
             .then(|| MageForm::new(config.form, config.mage_scales, height, width, device));
-        Self { config: config.clone(), rows, mage, rays: false }
+        Self { config: *config, rows, mage, rays: false }
     }
 
     /// For `rays` per panorama, as images `[B, rays, 1, 3]`. They are drawn evenly over the sphere and count alike.
@@ -149,7 +149,7 @@ impl Loss {
     /// If MAGE is on: rays have no neighbours.
     pub fn rays(config: &LossConfig, rays: usize, device: &Device) -> Self {
         assert!(config.mage.is_off(), "MAGE needs an image");
-        Self { config: config.clone(), rows: Tensor::ones([1, rays, 1, 1], device), mage: None, rays: true }
+        Self { config: *config, rows: Tensor::ones([1, rays, 1, 1], device), mage: None, rays: true }
     }
 
     /// All terms whose weight in `step` is not 0. Images `[B, H, W, 3]`; `posterior` is the encoder's
