@@ -40,10 +40,10 @@ fn reconstruction_prints_a_table_and_keeps_its_results() {
     assert!(out.contains("| System | Pass | D |") && out.contains("no weights"), "{out}");
     assert_eq!(std::fs::read_to_string(dir.path("eval/reconstruction.md")).unwrap(), out);
     let results = kept(&dir);
-    assert_eq!(results.len(), 4, "two panoramas, two passes");
+    assert_eq!(results.len(), 8, "two panoramas, two passes and two bases");
     let figures: Vec<_> =
         std::fs::read_dir(dir.path("eval/figures")).unwrap().map(|e| e.unwrap().path()).collect();
-    assert!(figures.len() == 1 && figures.iter().all(|f| image::open(f).is_ok()), "{figures:?}");
+    assert!(figures.len() == 3 && figures.iter().all(|f| image::open(f).is_ok()), "{figures:?}");
 
     let [table] = &dir.json(&args("reconstruction", &data, &[]))[..] else { panic!("one table") };
     assert_eq!(kept(&dir), results, "nothing was computed again");
@@ -54,9 +54,14 @@ fn reconstruction_prints_a_table_and_keeps_its_results() {
     let other = Dir::new();
     assert_eq!(other.json(&args("reconstruction", &data, &[]))[0], *table);
     let csv = other.ok(&args("reconstruction", &data, &["--table", "csv", "-q"]));
-    assert!(csv.starts_with("System,Pass,D,") && csv.lines().count() == 3, "{csv}");
+    assert!(csv.starts_with("System,Pass,D,") && csv.lines().count() == 5, "{csv}");
     let details = std::fs::read_to_string(other.path("eval/reconstruction-images.csv")).unwrap();
-    assert_eq!(details.lines().count(), 5);
+    assert_eq!(details.lines().count(), 9);
+    // without baselines two rows are left
+    let [bare] = &dir.json(&args("reconstruction", &data, &["--baselines", "none"]))[..] else {
+        panic!("one table")
+    };
+    assert_eq!(bare["rows"].as_array().unwrap()[..], table["rows"].as_array().unwrap()[..2]);
 }
 
 /// Killed half-way, then run again: what was finished is not touched, and the table is that of a run left alone.
@@ -101,8 +106,15 @@ fn every_protocol_runs_and_paper_runs_them_all() {
     let (dir, data) = (Dir::new(), text(panoramas()));
     let tables = dir.json(&args("paper", &data, &[]));
     let names: Vec<_> = tables.iter().map(|t| t["name"].as_str().unwrap().to_owned()).collect();
-    let expected =
-        ["reconstruction", "uniqueness", "consistency", "interpolation", "equivariance", "ablations"];
+    let expected = [
+        "reconstruction",
+        "uniqueness",
+        "consistency",
+        "interpolation",
+        "equivariance",
+        "ablations",
+        "inverse-rendering",
+    ];
     assert_eq!(names, expected);
     assert_eq!(tables[0]["rows"][0]["LDR PSNR (ref.), published"], "not at hand");
     let results = kept(&dir);
@@ -144,7 +156,8 @@ fn models_are_compared_under_their_names() {
     let rows: Vec<_> = table["rows"].as_array().unwrap().iter().map(|r| (&r["System"], &r["Pass"])).collect();
     let rows: Vec<_> =
         rows.iter().map(|(s, p)| format!("{} {}", s.as_str().unwrap(), p.as_str().unwrap())).collect();
-    assert_eq!(rows, ["whole autoencoder", "whole optimised", "bare optimised"]);
+    let bases = ["SH 12 least squares", "SG 9 optimised"];
+    assert_eq!(rows, [&["whole autoencoder", "whole optimised", "bare optimised"][..], &bases].concat());
     args[3] = "bare.safetensors";
     dir.refused(&args, &["bare", "NAME=FILE"]);
 }

@@ -51,8 +51,19 @@ fn several_files_give_one_line_of_json_each_and_a_bad_one_does_not_hide_the_rest
 #[test]
 fn completions_and_manual_pages_know_every_command() {
     let dir = Dir::new();
-    let commands =
-        ["bake", "sample", "encode", "render-probe", "inspect", "bench", "train", "completions", "man"];
+    let commands = [
+        "bake",
+        "sample",
+        "encode",
+        "evaluate",
+        "fit",
+        "render-probe",
+        "inspect",
+        "bench",
+        "train",
+        "completions",
+        "man",
+    ];
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let script = dir.ok(&["completions", shell]);
         assert!(commands.iter().all(|c| script.contains(c)), "{shell}");
@@ -64,14 +75,19 @@ fn completions_and_manual_pages_know_every_command() {
         assert!(page.contains("Examples"), "{command}");
     }
     dir.refused(&["man", "pages"], &["veni-cli.1", "--force"]);
-    assert_eq!(dir.json(&["man", "pages", "--force"])[0]["files"].as_array().unwrap().len(), 10);
+    assert_eq!(
+        dir.json(&["man", "pages", "--force"])[0]["files"].as_array().unwrap().len(),
+        commands.len() + 1
+    );
     assert_eq!(dir.json(&["completions", "bash"])[0]["shell"], "bash");
 }
 
 #[test]
 fn help_goes_to_stdout_and_shows_examples() {
     let dir = Dir::new();
-    for command in ["bake", "sample", "encode", "render-probe", "inspect", "bench", "train"] {
+    for command in
+        ["bake", "sample", "encode", "evaluate", "fit", "render-probe", "inspect", "bench", "train"]
+    {
         let text = dir.ok(&[command, "--help"]);
         assert!(text.contains("Examples:") && text.contains(&format!("veni-cli {command}")), "{command}");
         assert!(!text.contains('\u{1b}'), "no colours in a pipe");
