@@ -239,3 +239,30 @@ fn the_light_on_a_ball_is_found() {
     refused(&["ball.exr", "--normals", "bare.exr", "--ks", "0.5"], &["bare.exr", "--fov"]);
     mistyped(&dir, &["ball.exr", "--ks", "0.5"], "--normals");
 }
+
+#[test]
+fn networks_that_do_not_fold_and_auto_decoders_are_fitted_too() {
+    let dir = Dir::new();
+    let data = crate::util::text(crate::util::panoramas());
+    for (run, rest) in
+        [("film", &["--set", "model.decoder.conditioning=film"][..]), ("reni", &["--system", "reni++"])]
+    {
+        dir.ok(&[&crate::util::train_args(&data, run, "1")[..], rest].concat());
+        let common = ["fit", &panorama(), "--model", run, "--steps", "3", "--resolution", "32x16"];
+        let [found] = &dir.json(&[&common[..], &["--start", "zero"]].concat())[..] else {
+            panic!("one object")
+        };
+        assert!(found["ldr_psnr"].as_f64().unwrap().is_finite(), "{run}: {found}");
+        let out = format!("{run}.png");
+        dir.ok(&[
+            &common[..],
+            &["-o", &format!("{run}.json"), "--completed", &out, "--start", "zero", "--size", "64"],
+        ]
+        .concat());
+        assert_eq!(image::open(dir.path(&out)).unwrap().to_rgb8().dimensions(), (64, 32));
+    }
+    dir.refused(
+        &["fit", &panorama(), "--model", "reni", "--start", "encoder", "-q"],
+        &["no encoder", "--start"],
+    );
+}

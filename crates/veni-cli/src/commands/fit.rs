@@ -12,20 +12,19 @@ use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
 use veni_core::eval::metrics::{Alignment, Scores, scores};
-use veni_core::field;
-use veni_core::fit::{Best, FitConfig, Observation, best_of, fit_shaded, random_starts};
-use veni_core::latent::{Latent, Prior};
+use veni_core::eval::subject::Subject;
+use veni_core::fit::{Best, FitConfig, FitTarget, Observation, best_of, fit_shaded, random_starts};
+use veni_core::latent::Latent;
 use veni_core::output::Overwrite;
 use veni_core::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
-use veni_core::vae::Veni;
 
 use crate::args::{Force, ModelArgs};
 use crate::output::{self, with_remedy};
 use crate::progress::Progress;
 use crate::report::{self, Outcome, Report, to_stdout};
 use crate::size::Size;
-use crate::source::{self, Loaded};
+use crate::source;
 
 pub(crate) use input::Input;
 use settings::{Settings, Start};
@@ -91,15 +90,6 @@ pub(crate) struct Fit {
     force: Force,
 }
 
-/// What the fits share.
-struct Fitting<'a> {
-    loaded: &'a Loaded,
-    decoder: field::Decoder,
-    prior: Prior,
-    /// Loaded when a start asks for it.
-    encoder: Option<Veni>,
-}
-
 /// One picture's fit.
 pub(crate) struct Fitted {
     best: Best,
@@ -120,11 +110,12 @@ impl Fit {
         self.settings.grid(false)?;
         let config = self.settings.config()?;
         let loaded = source::model(&self.model)?;
-        let decoder = loaded.model.decoder().map_err(|e| e.in_file(&loaded.name))?;
-        let mut fitting = Fitting { loaded: &loaded, decoder, prior: loaded.model.prior(), encoder: None };
+        let device = DeviceKind::Flex.device()?;
+        let subject =
+            Subject::new(&loaded.name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?;
         let mut failed = Vec::new();
         for (at, path) in pictures.iter().enumerate() {
-            match self.one(path, outputs.get(at), &mut fitting, &config, report) {
+            match self.one(path, outputs.get(at), &subject, &config, report) {
                 Ok(()) => {}
                 Err(error) if report::is_closed_pipe(&error) => return Err(error),
                 Err(error) => failed.push(error),
@@ -158,28 +149,28 @@ impl Fit {
         &self,
         path: &Path,
         output: Option<&PathBuf>,
-        fitting: &mut Fitting<'_>,
+        subject: &Subject,
         config: &FitConfig,
         report: Report,
     ) -> Result<()> {
         let overwrite = Overwrite::from(self.force);
         let picture = self.input.read(path, report)?;
         let mut fitted = match &self.shaded.normals {
-            Some(normals) => self.fit_light(path, normals, &picture, fitting, config, report)?,
+            Some(normals) => self.fit_light(path, normals, &picture, subject, config, report)?,
             None => {
                 let grid = self.settings.grid(picture.is_partial())?;
                 let observation = self.input.observe(&picture, grid).map_err(|e| e.in_file(path))?;
-                self.fit(path, observation, fitting, config, report)?
+                self.fit(path, observation, subject, config, report)?
             }
         };
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
         fitted.best.latent.source = Some(name.unwrap_or_else(|| path.display().to_string()));
-        fitted.best.latent.model = Some(fitting.loaded.model.hash());
+        fitted.best.latent.model = Some(subject.model().hash());
         if let Some(output) = output {
             fitted.best.latent.save(output, overwrite).map_err(with_remedy)?;
         }
         let images = completed::Images {
-            decoder: &fitting.decoder,
+            subject,
             picture: &picture,
             view: self.input.view(),
             is_seen: self.shaded.normals.is_none(),
@@ -199,27 +190,27 @@ impl Fit {
         &self,
         path: &Path,
         observation: Observation,
-        fitting: &mut Fitting<'_>,
+        subject: &Subject,
         config: &FitConfig,
         report: Report,
     ) -> Result<Fitted> {
         let started = Instant::now();
         let partial = observation.is_partial();
-        let starts = self.starts(path, &observation, fitting)?;
+        let starts = self.starts(path, &observation, subject)?;
         self.check_starts(starts.len())?;
         let config = self.settings.adapted(*config, partial);
-        let total = config.steps * starts.len() as u64;
+        let (total, prior) = (config.steps * starts.len() as u64, subject.prior());
         let mut progress = Progress::start(report, "step", 0, total);
         let best = observation.with_target(|target| {
-            let target = veni_core::fit::FitTarget { prior: Some(&fitting.prior), ..target.clone() };
-            best_of(&fitting.decoder, &target, &starts, &config, &mut |step, loss| {
+            let target = FitTarget { prior: Some(&prior), ..target.clone() };
+            best_of(subject.fit_decoder(), &target, &starts, &config, &mut |step, loss| {
                 progress.set(step, || format!("loss {loss:.4}"));
             })
         });
         progress.finish();
         let mut best = best.map_err(|e| e.in_file(path))?;
         let scores = match (partial, observation.clipped.is_some()) {
-            (false, false) => Some(score(&fitting.decoder, &best.latent, &observation)?),
+            (false, false) => Some(score(subject, &best.latent, &observation)?),
             _ => None,
         };
         // from the image's exposure 0 to its own
@@ -236,7 +227,7 @@ impl Fit {
         path: &Path,
         normals: &Path,
         picture: &input::Read,
-        fitting: &Fitting<'_>,
+        subject: &Subject,
         config: &FitConfig,
         report: Report,
     ) -> Result<Fitted> {
@@ -245,7 +236,7 @@ impl Fit {
         let image = self.shaded.image(normals, self.input.mask(), picture, view)?;
         let config = self.settings.for_light(*config);
         let (start, count) = self.settings.start(false, false);
-        let n = fitting.decoder.latent_vectors();
+        let n = subject.latent_vectors();
         let first = match start {
             Start::Noise => None,
             Start::Zero => Some(Latent::new(vec![[0.0; 3]; n])),
@@ -255,10 +246,11 @@ impl Fit {
             ),
         };
         let rest = count - usize::from(first.is_some());
-        let random = random_starts(&fitting.prior, 0.0, rest, self.settings.seed());
+        let random = random_starts(&subject.prior(), 0.0, rest, self.settings.seed());
         let mut starts: Vec<_> = first.into_iter().chain(random).collect();
         self.check_starts(starts.len())?;
-        self.shaded.exposed(&image, picture, &fitting.decoder, &mut starts)?;
+        self.shaded.exposed(&image, picture, subject, &mut starts)?;
+        let prior = subject.prior();
         let mut progress = Progress::start(report, "step", 0, config.steps * starts.len() as u64);
         let image = [image];
         let (mut all, mut losses) = (Vec::new(), Vec::new());
@@ -266,8 +258,7 @@ impl Fit {
             let before = k as u64 * config.steps;
             let mut watch = |step, loss| progress.set(before + step, || format!("loss {loss:.4}"));
             let start = std::slice::from_ref(start);
-            let found =
-                fit_shaded(&fitting.decoder, &image, Some(&fitting.prior), start, &config, &mut watch);
+            let found = fit_shaded(subject.fit_decoder(), &image, Some(&prior), start, &config, &mut watch);
             let found = found.map_err(|e| e.in_file(path))?;
             all.extend(found.latents);
             losses.extend(found.last);
@@ -291,16 +282,11 @@ impl Fit {
     }
 
     /// The latents to start from, at the exposure that the observation was brought to.
-    fn starts(
-        &self,
-        path: &Path,
-        observation: &Observation,
-        fitting: &mut Fitting<'_>,
-    ) -> Result<Vec<Latent>> {
+    fn starts(&self, path: &Path, observation: &Observation, subject: &Subject) -> Result<Vec<Latent>> {
         let whole = !observation.is_partial();
-        let has_encoder = fitting.loaded.model.has_encoder();
+        let has_encoder = subject.model().has_encoder();
         let (start, count) = self.settings.start(whole, has_encoder);
-        let n = fitting.decoder.latent_vectors();
+        let n = subject.latent_vectors();
         let first = match start {
             Start::Noise => None,
             Start::Zero => Some(Latent::new(vec![[0.0; 3]; n])),
@@ -309,12 +295,14 @@ impl Fit {
                 path.display()
             ),
             Start::Encoder if !has_encoder => {
-                bail!("{}: this model has no encoder: use --start zero or noise", fitting.loaded.name)
+                bail!("{}: this model has no encoder: use --start zero or noise", subject.name())
             }
-            Start::Encoder => Some(fitting.encoded(observation)?),
+            Start::Encoder => {
+                subject.encode(observation.grid, &[&observation.log_radiance])?.into_iter().next()
+            }
         };
         let rest = count - usize::from(first.is_some());
-        let random = random_starts(&fitting.prior, 0.0, rest, self.settings.seed());
+        let random = random_starts(&subject.prior(), 0.0, rest, self.settings.seed());
         Ok(first.into_iter().chain(random).collect())
     }
 
@@ -359,22 +347,9 @@ impl Fit {
     }
 }
 
-impl Fitting<'_> {
-    fn encoded(&mut self, observation: &Observation) -> Result<Latent> {
-        if self.encoder.is_none() {
-            let veni = Veni::from_model(&self.loaded.model, &DeviceKind::Flex.device()?);
-            self.encoder = Some(veni.map_err(|e| e.in_file(&self.loaded.name))?);
-        }
-        let Some(veni) = &self.encoder else { bail!("no encoder") };
-        let found = veni.encode(observation.grid, &[&observation.log_radiance])?;
-        Ok(Latent::new(found.into_iter().next().map(|e| e.vectors).unwrap_or_default()))
-    }
-}
-
 /// The article's protocol, on the pixels that were fitted.
-fn score(decoder: &field::Decoder, latent: &Latent, seen: &Observation) -> Result<Scores> {
+fn score(subject: &Subject, latent: &Latent, seen: &Observation) -> Result<Scores> {
     let Equirect { width, height } = seen.grid;
-    let mut decoded = vec![[0.0; 3]; seen.grid.len()];
-    decoder.condition(latent)?.log_radiance_batch(&seen.grid.directions(), &mut decoded);
-    Ok(scores(decoded.as_flattened(), &seen.log_radiance, height, width, Alignment::LogFactor))
+    let decoded = subject.decode(seen.grid, std::slice::from_ref(latent))?.concat();
+    Ok(scores(&decoded, &seen.log_radiance, height, width, Alignment::LogFactor))
 }

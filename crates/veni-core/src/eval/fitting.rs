@@ -64,10 +64,7 @@ impl FitSettings {
         let images: Vec<_> = images.iter().map(Vec::as_slice).collect();
         let grid = coarse_grid(grid, self.factor);
         let target = FitTarget::panoramas(grid, &images);
-        match subject.field() {
-            Some(field) => fit::fit(field, &target, start, &self.config),
-            None => fit::fit(subject.network(), &target, start, &self.config),
-        }
+        fit::fit(subject.fit_decoder(), &target, start, &self.config)
     }
 }
 

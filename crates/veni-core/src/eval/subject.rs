@@ -6,6 +6,7 @@ use burn::tensor::Device;
 
 use super::store::digest;
 use crate::field;
+use crate::fit::FitDecoder;
 use crate::latent::{Latent, Prior};
 use crate::model::{Model, ModelKind};
 use crate::sphere::{Equirect, Stripes};
@@ -119,6 +120,11 @@ impl Subject {
     pub fn field(&self) -> Option<&field::Decoder> {
         let (Decoding::Whole { field, .. } | Decoding::Alone { field, .. }) = &*self.decoder;
         field.as_ref()
+    }
+
+    /// The decoder as fits take it: folded where it folds.
+    pub fn fit_decoder(&self) -> FitDecoder<'_> {
+        self.field().map_or_else(|| FitDecoder::Graph(self.network()), FitDecoder::Folded)
     }
 
     /// Where the encoder looks, if there is one.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use veni_core::field;
+use veni_core::eval::subject::Subject;
 use veni_core::fit::Best;
 use veni_core::latent::Latent;
 use veni_core::output::Overwrite;
@@ -23,7 +23,7 @@ const HOT: f32 = std::f32::consts::LN_2;
 
 /// What the images are made from.
 pub(super) struct Images<'a> {
-    pub(super) decoder: &'a field::Decoder,
+    pub(super) subject: &'a Subject,
     pub(super) picture: &'a Read,
     pub(super) view: Option<View>,
     /// Whether the picture shows the panorama, or a surface lit by it.
@@ -48,7 +48,8 @@ impl Images<'_> {
     /// What is known as it is, the rest from the latent.
     pub(super) fn completed(&self, path: &Path, latent: &Latent) -> Result<()> {
         let grid = self.grid()?;
-        let mut pixels = self.decoder.condition(latent)?.bake(grid);
+        let decoded = self.subject.decode(grid, std::slice::from_ref(latent))?.concat();
+        let mut pixels: Vec<_> = decoded.as_chunks::<3>().0.iter().map(|p| p.map(f32::exp)).collect();
         if !self.is_seen {
             return self.write(path, &Panorama::new(grid, pixels));
         }
@@ -88,12 +89,10 @@ impl Images<'_> {
     /// The standard deviation of log radiance over the starts (two at least), the root mean square of its channels.
     pub(super) fn uncertainty(&self, path: &Path, best: &Best) -> Result<()> {
         let grid = self.grid()?;
-        let directions = grid.directions();
         let (mut sum, mut squares) = (vec![0.0f64; 3 * grid.len()], vec![0.0f64; 3 * grid.len()]);
-        let mut decoded = vec![[0.0; 3]; grid.len()];
         for latent in &best.all {
-            self.decoder.condition(latent)?.log_radiance_batch(&directions, &mut decoded);
-            for (k, v) in decoded.as_flattened().iter().enumerate() {
+            let decoded = self.subject.decode(grid, std::slice::from_ref(latent))?.concat();
+            for (k, v) in decoded.iter().enumerate() {
                 sum[k] += f64::from(*v);
                 squares[k] += f64::from(*v).powi(2);
             }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use veni_core::field;
+use veni_core::eval::subject::Subject;
 use veni_core::fit::matching_exposure;
 use veni_core::latent::Latent;
 use veni_core::panorama;
@@ -148,17 +148,16 @@ impl Shaded {
         &self,
         image: &ShadedImage,
         picture: &Read,
-        decoder: &field::Decoder,
+        subject: &Subject,
         starts: &mut [Latent],
     ) -> Result<()> {
         if self.shading == Shading::Reference {
             return Ok(());
         }
-        let directions = image.transfer().lights().directions();
-        let mut light = vec![[0.0; 3]; directions.len()];
+        let grid = Equirect::new(self.lights, self.lights / 2);
         for start in starts {
-            decoder.condition(start)?.log_radiance_batch(directions, &mut light);
-            start.log_exposure += matching_exposure(image, &picture.pixels, &light);
+            let light = subject.decode(grid, std::slice::from_ref(start))?.concat();
+            start.log_exposure += matching_exposure(image, &picture.pixels, light.as_chunks().0);
         }
         Ok(())
     }

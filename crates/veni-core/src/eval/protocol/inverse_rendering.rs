@@ -190,10 +190,8 @@ fn fitted(subject: &Subject, grid: Equirect, item: &Item, set: Set, ks: f32) -> 
     start.log_exposure = matching_exposure(&image, &picture, dark.as_chunks().0);
     let config = FitConfig { prior: PRIOR, free_exposure: true, ..FitConfig::thorough().in_steps(set.steps) };
     let (images, prior, starts) = ([image], subject.prior(), [start]);
-    let FitResult { latents, last, .. } = match subject.field() {
-        Some(field) => fit_shaded(field, &images, Some(&prior), &starts, &config, &mut |_, _| {}),
-        None => fit_shaded(subject.network(), &images, Some(&prior), &starts, &config, &mut |_, _| {}),
-    }?;
+    let FitResult { latents, last, .. } =
+        fit_shaded(subject.fit_decoder(), &images, Some(&prior), &starts, &config, &mut |_, _| {})?;
     let vectors = latents.into_iter().next().map(|z| z.vectors).unwrap_or_default();
     Ok(Found { vectors, loss: last.into_iter().sum() })
 }
