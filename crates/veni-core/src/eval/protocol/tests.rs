@@ -271,8 +271,15 @@ fn the_paper_is_all_of_it() {
         evaluated(folder.path(), &both, &data, quick(), |run| paper::run(run, &published).unwrap());
     assert!(computed > 0);
     let names: Vec<_> = report.tables.iter().map(|t| t.name.as_str()).collect();
-    let expected =
-        ["reconstruction", "uniqueness", "consistency", "interpolation", "equivariance", "ablations"];
+    let expected = [
+        "reconstruction",
+        "uniqueness",
+        "consistency",
+        "interpolation",
+        "equivariance",
+        "ablations",
+        "inverse-rendering",
+    ];
     assert_eq!(names, expected);
     let cell = report.tables[0].cell("two", "LDR PSNR (ref.), published");
     assert_eq!(cell, Some(&Cell::missing("not at hand")));
@@ -313,7 +320,15 @@ fn identities_see_the_encoder_too() {
 
 #[test]
 fn the_light_on_a_ball_is_found_from_the_picture_alone() {
-    let (folder, data, subjects) = (tempfile::tempdir().unwrap(), skies(2), [subject("tiny", 1)]);
+    let (folder, subjects) = (tempfile::tempdir().unwrap(), [subject("tiny", 1)]);
+    // skies of the model itself: an untrained decoder has few others
+    let sky = |seed| {
+        let latent = crate::latent::Latent::from_seed(&subjects[0].prior(), seed);
+        let image = subjects[0].decode(GRID, &[latent]).unwrap().concat();
+        let sky = crate::panorama::Panorama::from_log(GRID, image.as_chunks().0);
+        Item::new(&PathBuf::from(format!("own-{seed}.exr")), &sky, GRID)
+    };
+    let data = Dataset::new(GRID, vec![sky(1), sky(2)]);
     let run =
         || evaluated(folder.path(), &subjects, &data, quick(), |run| inverse_rendering::run(run).unwrap());
     let (first, computed) = run();
@@ -322,11 +337,15 @@ fn the_light_on_a_ball_is_found_from_the_picture_alone() {
     assert_eq!((computed, &again.tables), (0, &first.tables));
     let rows = first.tables[0].rows.len();
     assert_eq!((rows, first.details[0].rows.len()), (3, 6));
-    let loss = first.tables[0].columns.iter().position(|c| c.title == "loss of the picture").unwrap();
-    for row in &first.tables[0].rows {
-        let loss = row[loss].number().unwrap();
-        // 0.1 is the loss of a picture that is off by a factor of e everywhere
-        assert!((0.0..0.05).contains(&loss), "{loss}");
-    }
+    let elsewhere = tempfile::tempdir().unwrap();
+    let (foreign, _) = evaluated(elsewhere.path(), &subjects, &skies(2), quick(), |run| {
+        inverse_rendering::run(run).unwrap()
+    });
+    let loss = |report: &Report| -> f64 {
+        let table = &report.tables[0];
+        let at = table.columns.iter().position(|c| c.title == "loss of the picture").unwrap();
+        table.rows.iter().map(|row| row[at].number().unwrap()).sum()
+    };
+    assert!(loss(&first) < 0.5 * loss(&foreign), "{} {}", loss(&first), loss(&foreign));
     assert_eq!(first.figures.len(), 2);
 }
