@@ -53,7 +53,8 @@ pub enum Objective {
     /// cannot follow does not drag the rest along.
     LogAbsolute,
     /// Σ ω m (D(P) − D(I))²/Σ ω m + `log` · [`Objective::LogError`], D(x) = the sRGB curve of
-    /// min(eˣ/white, 1), white = the 98 % quantile of the image: what the LDR scores see.
+    /// min(eˣ/white, 1), white = the 98 % quantile of the image: errors as a screen shows them. (The LDR
+    /// scores give the prediction a white of its own; this does not optimise them.)
     Display {
         /// Weight of the log error, which keeps what the display clips in place.
         log: f64,
@@ -81,7 +82,7 @@ impl FitConfig {
         }
     }
 
-    /// As [`FitConfig::thorough`], for what a viewer sees: the best LDR scores.
+    /// As [`FitConfig::thorough`], for what a screen shows under the image's own white.
     pub fn display() -> Self {
         Self { objective: Objective::Display { log: 0.01 }, prior: 1e-4, ..Self::thorough() }
     }

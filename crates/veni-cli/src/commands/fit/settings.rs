@@ -72,7 +72,7 @@ enum Preset {
     /// Log radiance, weighted by solid angle: 400 steps
     #[default]
     Thorough,
-    /// What is seen on a screen: the best LDR scores
+    /// What is seen on a screen under the picture's own white; highlights beyond it are left alone
     Display,
     /// The article's helper: 2000 steps from 1e-2 to 2e-3, unweighted, without a prior
     Reference,
