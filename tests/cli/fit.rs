@@ -199,6 +199,7 @@ fn what_cannot_be_fitted_is_refused_before_any_work() {
     refused(&[&sky, &sky, "-o", "a.json"], &["--out-dir"]);
     refused(&[&sky, &sky, "--out-dir", "d", "--completed", "c.exr"], &["--completed"]);
     refused(&[&sky, "-o", "a.json", "--uncertainty", "u.exr", "--steps", "1"], &["--starts"]);
+    refused(&[&sky, "-o", "a.json", "--completed", "c.exr", "--size", "8x8"], &["--size 8x8"]);
     refused(&[&sky, "--prior=-1"], &["prior = -1"]);
     refused(&[&sky, "--resolution", "32x32"], &["--resolution"]);
     mistyped(&dir, &[&sky, "--rate", "0"], "learning rate");

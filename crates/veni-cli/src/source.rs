@@ -5,9 +5,10 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
+use veni_core::Error;
 use veni_core::latent::Latent;
 use veni_core::model::Model;
-use veni_core::{Error, panorama};
+use veni_core::panorama::{self, Panorama};
 
 use crate::args::ModelArgs;
 use crate::output::{CUBE_FACES, LATENT};
@@ -115,6 +116,21 @@ fn encode(path: &Path, _: &Loaded, _: Report) -> Result<Latent> {
         "{}: no latent inside, and this build cannot encode panoramas (it lacks the feature `learn`)",
         path.display()
     )
+}
+
+/// A panorama with every value positive and finite; says what was replaced.
+pub(crate) fn panorama(path: &Path, report: Report) -> Result<Panorama> {
+    let mut panorama = Panorama::read(path)?;
+    let bad = panorama.sanitise().map_err(|e| e.in_file(path))?;
+    if bad.nan + bad.infinite > 0 {
+        report.note(format_args!(
+            "{}: {} values that are not a number and {} infinite ones were replaced",
+            path.display(),
+            bad.nan,
+            bad.infinite
+        ));
+    }
+    Ok(panorama)
 }
 
 enum Content {

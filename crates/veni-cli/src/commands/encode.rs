@@ -95,16 +95,7 @@ impl<'a> Encoding<'a> {
 
     /// Reads, encodes, and decodes again to compare.
     pub(crate) fn encode_file(&self, path: &Path, report: Report) -> Result<Encoded> {
-        let mut panorama = Panorama::read(path)?;
-        let bad = panorama.sanitise().map_err(|e| e.in_file(path))?;
-        if bad.nan + bad.infinite > 0 {
-            report.note(format_args!(
-                "{}: {} values that are not a number and {} infinite ones were replaced",
-                path.display(),
-                bad.nan,
-                bad.infinite
-            ));
-        }
+        let panorama = source::panorama(path, report)?;
         let grid = Equirect::new(GRID[0], GRID[1]);
         let item = Item::new(path, &panorama, grid);
         let encoded =

@@ -13,7 +13,7 @@ use clap::Args;
 use serde_json::json;
 use veni_core::eval::metrics::{Alignment, Scores, scores};
 use veni_core::eval::subject::Subject;
-use veni_core::fit::{Best, FitConfig, FitTarget, Observation, best_of, fit_shaded, random_starts};
+use veni_core::fit::{Best, FitConfig, FitTarget, Observation, best_light, best_of, random_starts};
 use veni_core::latent::Latent;
 use veni_core::output::Overwrite;
 use veni_core::sphere::Equirect;
@@ -126,6 +126,9 @@ impl Fit {
 
     /// Refuses what could not be written after the fits.
     fn check_images(&self, overwrite: Overwrite) -> Result<()> {
+        if let Some(size) = self.size {
+            size.equirect()?;
+        }
         let images = [(&self.completed, "--completed"), (&self.uncertainty, "--uncertainty")];
         for (path, option) in images {
             if path.is_some() && self.input.pictures.len() > 1 {
@@ -252,22 +255,13 @@ impl Fit {
         self.shaded.exposed(&image, picture, subject, &mut starts)?;
         let prior = subject.prior();
         let mut progress = Progress::start(report, "step", 0, config.steps * starts.len() as u64);
-        let image = [image];
-        let (mut all, mut losses) = (Vec::new(), Vec::new());
-        for (k, start) in starts.iter().enumerate() {
-            let before = k as u64 * config.steps;
-            let mut watch = |step, loss| progress.set(before + step, || format!("loss {loss:.4}"));
-            let start = std::slice::from_ref(start);
-            let found = fit_shaded(subject.fit_decoder(), &image, Some(&prior), start, &config, &mut watch);
-            let found = found.map_err(|e| e.in_file(path))?;
-            all.extend(found.latents);
-            losses.extend(found.last);
-        }
+        let mut watch = |step, loss| progress.set(step, || format!("loss {loss:.4}"));
+        let best = best_light(subject.fit_decoder(), &image, Some(&prior), &starts, &config, &mut watch);
         progress.finish();
-        for latent in &mut all {
+        let mut best = best.map_err(|e| e.in_file(path))?;
+        for latent in best.all.iter_mut().chain([&mut best.latent]) {
             latent.log_exposure = self.shaded.recorded(latent.log_exposure);
         }
-        let best = Best::of(all, losses);
         Ok(Fitted { best, known: None, scores: None, seconds: started.elapsed().as_secs_f64() })
     }
 

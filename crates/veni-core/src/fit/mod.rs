@@ -20,7 +20,7 @@ pub use config::{FitConfig, Objective, Plateau};
 pub use network::FitDecoder;
 pub use observation::{Observation, Picture};
 pub use shaded::{fit_shaded, matching_exposure};
-pub use starts::{Best, best_of, random_starts};
+pub use starts::{Best, best_light, best_of, random_starts};
 pub use target::FitTarget;
 
 use crate::latent::{Latent, Prior};

@@ -1,9 +1,10 @@
 //! Several starts for one image: the best of them, and how much they disagree.
 
-use super::{FitConfig, FitDecoder, FitResult, FitTarget, fit_watched};
+use super::{FitConfig, FitDecoder, FitResult, FitTarget, fit_shaded, fit_watched};
 use crate::Result;
 use crate::data::random::{Purpose, stream};
 use crate::latent::{Latent, Prior};
+use crate::shade::ShadedImage;
 
 /// The best of several fits of one image.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,16 +43,42 @@ pub fn best_of<'a>(
     config: &FitConfig,
     watch: &mut dyn FnMut(u64, f64),
 ) -> Result<Best> {
-    assert!(!starts.is_empty() && target.images.len() == 1, "one image and at least one start");
+    assert!(target.images.len() == 1, "one image");
     let decoder = decoder.into();
+    from_each(starts, config, watch, |start, watch| fit_watched(decoder, target, start, config, watch))
+}
+
+/// [`best_of`] for the light on a surface: [`fit_shaded`] of one image from every start.
+///
+/// # Errors
+/// As [`fit_shaded`].
+///
+/// # Panics
+/// If there is no start.
+pub fn best_light<'a>(
+    decoder: impl Into<FitDecoder<'a>>,
+    image: &ShadedImage,
+    prior: Option<&Prior>,
+    starts: &[Latent],
+    config: &FitConfig,
+    watch: &mut dyn FnMut(u64, f64),
+) -> Result<Best> {
+    let (decoder, image) = (decoder.into(), std::slice::from_ref(image));
+    from_each(starts, config, watch, |start, watch| fit_shaded(decoder, image, prior, start, config, watch))
+}
+
+fn from_each(
+    starts: &[Latent],
+    config: &FitConfig,
+    watch: &mut dyn FnMut(u64, f64),
+    mut fit: impl FnMut(&[Latent], &mut dyn FnMut(u64, f64)) -> Result<FitResult>,
+) -> Result<Best> {
     let (mut all, mut losses) = (Vec::new(), Vec::new());
     for (k, start) in starts.iter().enumerate() {
         let before = k as u64 * config.steps;
-        let start = std::slice::from_ref(start);
-        let FitResult { latents, last, .. } =
-            fit_watched(decoder, target, start, config, &mut |step, loss| watch(before + step, loss))?;
-        all.extend(latents);
-        losses.extend(last);
+        let found = fit(std::slice::from_ref(start), &mut |step, loss| watch(before + step, loss))?;
+        all.extend(found.latents);
+        losses.extend(found.last);
     }
     Ok(Best::of(all, losses))
 }
@@ -61,7 +88,7 @@ impl Best {
     ///
     /// # Panics
     /// If there is none, or not one loss for each.
-    pub fn of(all: Vec<Latent>, losses: Vec<f64>) -> Self {
+    fn of(all: Vec<Latent>, losses: Vec<f64>) -> Self {
         assert!(!all.is_empty() && all.len() == losses.len(), "a loss for each of at least one latent");
         let best = (0..all.len()).min_by(|a, b| losses[*a].total_cmp(&losses[*b])).unwrap_or(0);
         Self { latent: all[best].clone(), loss: losses[best], all, losses }

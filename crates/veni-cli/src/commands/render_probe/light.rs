@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use veni_core::latent::Latent;
-use veni_core::panorama::{self, Panorama};
+use veni_core::panorama;
 use veni_core::sphere::Equirect;
 
 use crate::args::ModelArgs;
@@ -28,16 +28,7 @@ pub(super) fn from_file(
     if panorama::attributes(path)?.contains_key(CUBE_FACES) {
         bail!("{}: a cube map is no panorama; name an equirectangular image", path.display());
     }
-    let mut image = Panorama::read(path)?;
-    let bad = image.sanitise().map_err(|e| e.in_file(path))?;
-    if bad.nan + bad.infinite > 0 {
-        report.note(format_args!(
-            "{}: {} values that are not a number and {} infinite ones were replaced",
-            path.display(),
-            bad.nan,
-            bad.infinite
-        ));
-    }
+    let image = source::panorama(path, report)?;
     Ok(image.resample_turned(grid, turn).into_pixels())
 }
 
