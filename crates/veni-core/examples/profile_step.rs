@@ -9,13 +9,12 @@ use std::time::Instant;
 
 use burn::tensor::Tensor;
 use veni_core::data::Splits;
-use veni_core::data::random::{Purpose, stream};
 use veni_core::train::batch::Batches;
-use veni_core::train::loss::Loss;
+use veni_core::train::config::DecoderBy;
+use veni_core::train::network::{Network, Prepared};
 use veni_core::train::optimiser::{Group, Optimiser};
 use veni_core::train::presets::Preset;
-use veni_core::train::step::{batch_loss, encode, tensor};
-use veni_core::vae::Veni;
+use veni_core::train::step::{encode, tensor};
 use veni_core::{Error, Result};
 
 /// As the training example.
@@ -56,44 +55,58 @@ fn main() -> Result<()> {
     config.check()?;
     let splits = Splits::open(&config.data, config.seed)?;
     let device = config.device.device()?.autodiff();
-    let mut veni = Veni::new(&config.model, &mut stream(0, Purpose::Weights, 0, 0), &device)?;
+    let mut network = Network::new(&config, splits.train.len(), &device)?;
     let groups = config.groups().into_iter();
     let groups = groups.map(|(prefix, g)| Group { prefix: prefix.into(), adam: g.adam });
-    let mut optimiser = Optimiser::new(&veni, groups.collect(), config.ema_decay)?;
+    let mut optimiser = Optimiser::new(&network, groups.collect(), config.ema_decay)?;
+    let Network::Veni(veni) = &network else {
+        return Err(Error::invalid("only auto-encoders are profiled"));
+    };
     let batches = Batches::new(&config, veni.stripes()?, &splits.train);
-    let [height, width] = [config.data.height, config.data.width].map(|n| n / config.loss_grid.factor());
-    let loss = Loss::new(&config.loss, height, width, &device);
+    let loss = Network::loss(&config, &device);
 
     let mut clock = Clock::default();
     for step in 1..=1 + STEPS {
         let counts = step > 1;
         let batch = clock.time("data (on another thread in a run)", counts, || batches.prepare(step));
-        let total = clock
-            .time("whole step: forward", counts, || batch_loss(&veni, &batch, &loss, &device).terms.total());
-        let gradients = clock.time("whole step: backward", counts, || total.backward());
+        let prepared = Prepared::Panoramas(batch.clone());
+        let mut gradients =
+            |part, by| clock.time(part, counts, || network.gradients(&prepared, &loss, by, &device).1);
+        gradients("whole step: gradients by tensor operations", DecoderBy::Tensors);
+        let found = gradients("whole step: gradients by kernels", DecoderBy::Kernels);
         let rates = config.groups().into_iter().map(|(_, g)| g.learning_rate.at(step)).collect::<Vec<_>>();
-        (veni, _) = clock
-            .time("whole step: Adam, clipping, average", counts, || optimiser.step(veni, &gradients, &rates));
+        (network, _) = clock.time("whole step: Adam, clipping, average", counts, || {
+            optimiser.step(network.clone(), &found, &rates)
+        });
+        let Network::Veni(veni) = &network else { unreachable!("made as one") };
 
         // the parts again, each on a graph of its own
-        let posterior = clock.time("encoder alone: forward", counts, || encode(&veni, &batch, &device));
+        let posterior = clock.time("encoder alone: forward", counts, || encode(veni, &batch, &device));
         clock.time("encoder alone: backward", counts, || posterior.mean.sum().backward());
         let [rows, columns] = batch.loss_size;
         let shape = [batch.images, rows, columns, 3];
         let latent =
             tensor::<3>(&batch.noise, [batch.images, veni.latent_vectors(), 3], &device).require_grad();
         let directions = tensor(&batch.loss_directions, [rows * columns, 3], &device);
-        let decoded =
-            clock.time("decoder alone: forward", counts, || veni.decoder.forward(latent, directions));
+        let decoded = clock.time("decoder by tensor operations: forward", counts, || {
+            veni.decoder.forward(latent.clone(), directions)
+        });
         let image: Tensor<4> = decoded.clone().detach().reshape(shape).require_grad();
-        clock.time("decoder alone: backward", counts, || decoded.sum().backward());
+        clock.time("decoder by tensor operations: backward", counts, || decoded.sum().backward());
+        let native = veni.decoder.native(latent)?;
+        let directions = batch.loss_directions.as_chunks().0;
+        let rays = directions.len();
+        let values = clock.time("decoder by kernels: forward", counts, || native.forward(directions, rays));
+        clock.time("decoder by kernels: backward", counts, || {
+            native.backward(directions, rays, &vec![1.0; values.len()]).backward()
+        });
         let target = tensor(&batch.target, shape, &device);
         let value =
             clock.time("losses alone: forward", counts, || loss.terms(step, image, target, None).total());
         clock.time("losses alone: backward", counts, || value.backward());
     }
     for (part, seconds) in clock.0 {
-        println!("{part:36} {:8.1} ms", 1e3 * seconds);
+        println!("{part:44} {:8.1} ms", 1e3 * seconds);
     }
     Ok(())
 }

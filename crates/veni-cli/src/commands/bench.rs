@@ -49,7 +49,7 @@ pub(crate) struct Bench {
         default_value = "128x64,1024x512,2048x1024,4096x2048")]
     sizes: Vec<Size>,
 
-    /// Also what takes longer than ten seconds
+    /// Also what takes longer than ten seconds, measured once
     #[arg(long)]
     all: bool,
 }

@@ -61,11 +61,11 @@ impl Field {
     }
 
     fn run(&self, directions: &[[f32; 3]], out: &mut [[f32; 3]], log: bool, scratch: &mut Aligned) {
-        let (weights, folded, arch) = (&*self.weights, &*self.folded, pulp::Arch::new());
+        let (mlp, folded, arch) = (&self.weights.mlp, &*self.folded, pulp::Arch::new());
         if directions.len() <= FEW {
-            arch.dispatch(Single { weights, folded, directions, out, log });
+            arch.dispatch(Single { mlp, folded, directions, out, log });
         } else {
-            arch.dispatch(Blocks { weights, folded, directions, out, log, scratch });
+            arch.dispatch(Blocks { mlp, folded, directions, out, log, scratch });
         }
     }
 

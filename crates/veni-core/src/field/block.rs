@@ -8,7 +8,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::aligned::Aligned;
-use super::weights::{Matrix, PANEL, Weights};
+use super::mlp::{Matrix, Mlp, PANEL};
 use super::{Folded, math};
 
 /// Vectors per row.
@@ -23,7 +23,7 @@ pub(super) type Row<S> = [<S as Simd>::f32s; VECTORS];
 
 /// Work for one thread: any number of directions, one after the other in blocks.
 pub(super) struct Blocks<'a> {
-    pub(super) weights: &'a Weights,
+    pub(super) mlp: &'a Mlp,
     pub(super) folded: &'a Folded,
     pub(super) directions: &'a [[f32; 3]],
     /// As many as directions.
@@ -38,10 +38,9 @@ impl WithSimd for Blocks<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { weights, folded, directions, out, log, scratch } = self;
+        let Self { mlp, folded, directions, out, log, scratch } = self;
         let row = VECTORS * S::F32_LANES;
-        let (hidden, widest) =
-            (weights.padded(), weights.input.iter().map(|c| c.weight.inputs).max().unwrap_or(0));
+        let (hidden, widest) = (mlp.padded(), mlp.input.iter().map(|c| c.weight.inputs).max().unwrap_or(0));
         let scratch = scratch.at_least(row * (4 + hidden + hidden.max(widest) + PANEL));
         let (rows, _) = S::as_mut_simd_f32s(scratch).0.as_chunks_mut::<VECTORS>();
         let (direction, rows) = rows.split_at_mut(4);
@@ -50,7 +49,7 @@ impl WithSimd for Blocks<'_> {
         let rgb = &mut rows[..PANEL];
         for (directions, out) in directions.chunks(row).zip(out.chunks_mut(row)) {
             scatter(simd, directions, direction);
-            network(simd, weights, folded, direction, x, y, rgb);
+            network(simd, mlp, folded, direction, x, y, rgb);
             let offset = simd.splat_f32s(folded.log_exposure);
             for value in rgb[..3].as_flattened_mut() {
                 *value = simd.add_f32s(*value, offset);
@@ -86,15 +85,15 @@ pub(super) fn scatter<S: Simd>(simd: S, directions: &[[f32; 3]], rows: &mut [Row
 #[inline(always)]
 fn network<S: Simd>(
     simd: S,
-    weights: &Weights,
+    mlp: &Mlp,
     folded: &Folded,
     direction: &[Row<S>],
     x: &mut [Row<S>],
     y: &mut [Row<S>],
     rgb: &mut [Row<S>],
 ) {
-    let hidden = weights.hidden;
-    for (i, chunk) in weights.input.iter().enumerate() {
+    let hidden = mlp.hidden;
+    for (i, chunk) in mlp.input.iter().enumerate() {
         encode(simd, folded, chunk.inputs.clone(), direction, y);
         if i == 0 {
             product::<S, false, false>(simd, &chunk.weight, &folded.input_bias, y, x);
@@ -102,13 +101,13 @@ fn network<S: Simd>(
             product::<S, true, false>(simd, &chunk.weight, &folded.no_bias, y, x);
         }
     }
-    for (layer, shift) in weights.layers.iter().zip(&folded.shift) {
+    for (layer, shift) in mlp.layers.iter().zip(&folded.shift) {
         normalise(simd, &mut x[..hidden], &layer.gamma1, &layer.beta1);
         product::<S, false, true>(simd, &layer.ff1, &layer.ff1_bias, x, y);
         product::<S, true, false>(simd, &layer.ff2, &layer.ff2_bias, y, x);
         normalise(simd, &mut x[..hidden], &layer.gamma2, shift);
     }
-    product::<S, false, false>(simd, &weights.output, &weights.output_bias, x, rgb);
+    product::<S, false, false>(simd, &mlp.output, &mlp.output_bias, x, rgb);
 }
 
 /// Five features of each directional input: sine and cosine at frequencies 1 and 4, and the input itself.

@@ -55,8 +55,8 @@ pub(super) fn attention(weights: &Weights, latent: &Latent) -> Vec<Vec<f32>> {
     let c: Vec<f32> = latent.vectors.iter().flat_map(invariants).collect();
     // compiled for the widest registers of the machine
     pulp::Arch::new().dispatch(|| {
-        let layer = |layer: &super::weights::Layer| affine(&layer.out, &affine(&layer.value, &c));
-        weights.layers.iter().map(layer).collect()
+        let attention = weights.attention.iter();
+        attention.map(|layer| affine(&layer.out, &affine(&layer.value, &c))).collect()
     })
 }
 

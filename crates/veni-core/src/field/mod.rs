@@ -15,8 +15,9 @@ mod aligned;
 mod bake;
 mod block;
 mod condition;
-mod gradient;
+pub(crate) mod gradient;
 mod math;
+mod mlp;
 mod rate;
 mod single;
 mod weights;
@@ -120,16 +121,16 @@ impl Decoder {
         let attention = condition::attention(weights, latent);
         let plus = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a + b).collect::<Vec<f32>>();
         let mut input_bias = plus(&weights.input_bias, &attention[0]);
-        input_bias.resize(weights.padded(), 0.0);
+        input_bias.resize(weights.mlp.padded(), 0.0);
         let next = attention[1..].iter().map(Some).chain([None]);
-        let shift = weights.layers.iter().zip(next);
+        let shift = weights.attention.iter().zip(next);
         let shift = shift.map(|(layer, next)| match next {
             Some(attention) => plus(&layer.beta2, attention),
             None => layer.beta2.clone(),
         });
         let folded = Folded {
             vectors: latent.vectors.iter().map(|[x, y, _]| [*x, *y]).collect(),
-            no_bias: vec![0.0; weights.padded()],
+            no_bias: vec![0.0; weights.mlp.padded()],
             input_bias,
             shift: shift.collect(),
             log_exposure: latent.log_exposure,

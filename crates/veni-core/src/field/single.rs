@@ -6,7 +6,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::block::{EPSILON, PARTIAL, inner_product};
-use super::weights::{Matrix, PANEL, Weights};
+use super::mlp::{Matrix, Mlp, PANEL};
 use super::{Folded, math};
 
 /// Panels that run side by side: enough independent sums to hide the latency of multiply-add.
@@ -14,7 +14,7 @@ const SIDE: usize = 8;
 
 /// Work for one thread: a few directions, one by one.
 pub(super) struct Single<'a> {
-    pub(super) weights: &'a Weights,
+    pub(super) mlp: &'a Mlp,
     pub(super) folded: &'a Folded,
     pub(super) directions: &'a [[f32; 3]],
     /// As many as directions.
@@ -28,12 +28,12 @@ impl WithSimd for Single<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { weights, folded, directions, out, log } = self;
-        let mut features = vec![0.0; 5 * (weights.latent_vectors + 2)];
-        let (mut x, mut y) = (vec![0.0; weights.padded()], vec![0.0; weights.padded()]);
+        let Self { mlp, folded, directions, out, log } = self;
+        let mut features = vec![0.0; 5 * (folded.vectors.len() + 2)];
+        let (mut x, mut y) = (vec![0.0; mlp.padded()], vec![0.0; mlp.padded()]);
         for (direction, out) in directions.iter().zip(out) {
             encode(simd, folded, *direction, &mut features);
-            let rgb = network::<S>(weights, folded, &features, &mut x, &mut y);
+            let rgb = network::<S>(mlp, folded, &features, &mut x, &mut y);
             *out = rgb.map(|value| {
                 let value = value + folded.log_exposure;
                 if log { value } else { first(math::exp(simd, simd.splat_f32s(value))) }
@@ -83,15 +83,9 @@ fn write<S: Simd>(simd: S, features: &mut [f32], value: S::f32s, turns: S::f32s)
 }
 
 #[inline(always)]
-fn network<S: Simd>(
-    weights: &Weights,
-    folded: &Folded,
-    features: &[f32],
-    x: &mut [f32],
-    y: &mut [f32],
-) -> [f32; 3] {
-    let hidden = weights.hidden;
-    for (i, chunk) in weights.input.iter().enumerate() {
+fn network<S: Simd>(mlp: &Mlp, folded: &Folded, features: &[f32], x: &mut [f32], y: &mut [f32]) -> [f32; 3] {
+    let hidden = mlp.hidden;
+    for (i, chunk) in mlp.input.iter().enumerate() {
         let features = &features[5 * chunk.inputs.start..];
         if i == 0 {
             product::<S, false, false>(&chunk.weight, &folded.input_bias, features, x);
@@ -99,14 +93,14 @@ fn network<S: Simd>(
             product::<S, true, false>(&chunk.weight, &folded.no_bias, features, x);
         }
     }
-    for (layer, shift) in weights.layers.iter().zip(&folded.shift) {
+    for (layer, shift) in mlp.layers.iter().zip(&folded.shift) {
         normalise::<S>(&mut x[..hidden], &layer.gamma1, &layer.beta1);
         product::<S, false, true>(&layer.ff1, &layer.ff1_bias, x, y);
         product::<S, true, false>(&layer.ff2, &layer.ff2_bias, y, x);
         normalise::<S>(&mut x[..hidden], &layer.gamma2, shift);
     }
     let mut rgb = [0.0; PANEL];
-    product::<S, false, false>(&weights.output, &weights.output_bias, x, &mut rgb);
+    product::<S, false, false>(&mlp.output, &mlp.output_bias, x, &mut rgb);
     [rgb[0], rgb[1], rgb[2]]
 }
 

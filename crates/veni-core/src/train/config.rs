@@ -25,6 +25,9 @@ pub struct TrainConfig {
     pub order: Order,
     /// Where gradients are computed.
     pub device: DeviceKind,
+    /// What computes the decoder and its gradients.
+    #[serde(default)]
+    pub decoder_by: DecoderBy,
     /// Decay of the averaged weights, which are validated and become the model; 0 takes the last weights.
     pub ema_decay: f64,
     /// The network.
@@ -57,6 +60,18 @@ pub enum Order {
     Shuffle,
     /// Independently, with replacement (the authors').
     Replacement,
+}
+
+/// What computes the decoder and its gradients in training: the same numbers up to rounding.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DecoderBy {
+    /// The vectorised kernels of [`field`](crate::field), on the processor ([`Native`](crate::vae::Native)). A network
+    /// that does not fold per latent is computed by tensor operations all the same.
+    #[default]
+    Kernels,
+    /// Tensor operations on the device.
+    Tensors,
 }
 
 /// Where gradients are computed.

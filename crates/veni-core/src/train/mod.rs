@@ -7,6 +7,7 @@ pub mod config;
 pub mod latents;
 mod log;
 pub mod loss;
+mod native;
 pub mod network;
 pub mod optimiser;
 pub mod presets;

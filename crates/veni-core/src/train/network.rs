@@ -1,14 +1,15 @@
 //! What a run trains: one of the two systems, and the batches that it takes.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Gradients, Tensor};
 
 use crate::data::Dataset;
 use crate::data::random::{Purpose, stream};
 use crate::model::ModelKind;
 use crate::train::batch::{Batch, Batches};
-use crate::train::config::TrainConfig;
+use crate::train::config::{DecoderBy, TrainConfig};
 use crate::train::loss::{Loss, LossTerms};
+use crate::train::native;
 use crate::train::rays::{RayBatch, RayBatches};
 use crate::train::step::{batch_loss, tensor};
 use crate::vae::{Decoder, Reni, Veni};
@@ -92,6 +93,25 @@ impl Network {
                 Loss::new(&config.loss, height, width, device)
             }
         }
+    }
+
+    /// The weighted losses of a batch and the gradients of their sum.
+    ///
+    /// # Panics
+    /// As [`Network::terms`].
+    pub fn gradients(
+        &self,
+        batch: &Prepared,
+        loss: &Loss,
+        by: DecoderBy,
+        device: &Device,
+    ) -> (LossTerms, Gradients) {
+        if by == DecoderBy::Kernels && self.decoder().config().check_folds().is_ok() {
+            return native::gradients(self, batch, loss, device);
+        }
+        let terms = self.terms(batch, loss, device);
+        let gradients = terms.total().backward();
+        (terms, gradients)
     }
 
     /// The weighted losses of a batch, on the graph.

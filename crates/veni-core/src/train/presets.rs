@@ -3,7 +3,9 @@
 use crate::data::{AugmentConfig, DataConfig};
 use crate::fit::FitConfig;
 use crate::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
-use crate::train::config::{DeviceKind, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig};
+use crate::train::config::{
+    DecoderBy, DeviceKind, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig,
+};
 use crate::train::latents::LatentsConfig;
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
@@ -129,6 +131,7 @@ fn small(latent_vectors: usize) -> TrainConfig {
         batch: 4,
         order: Order::Shuffle,
         device: DeviceKind::Flex,
+        decoder_by: DecoderBy::Kernels,
         ema_decay: 0.999,
         model: ModelConfig {
             kind: ModelKind::Veni,

@@ -208,15 +208,14 @@ impl Trainer {
     fn update(&mut self, batch: &Prepared) -> Result<StepReport> {
         let clock = Instant::now();
         let step = batch.step();
-        let terms = self.network.terms(batch, &self.loss, &self.device);
-        let total = terms.total();
-        let value = f64::from(total.clone().into_scalar::<f32>());
+        let by = self.config.decoder_by;
+        let (terms, gradients) = self.network.gradients(batch, &self.loss, by, &self.device);
+        let value = f64::from(terms.total().into_scalar::<f32>());
         if !value.is_finite() {
             return Err(Error::invalid(format!(
                 "the loss is {value} at update {step}: lower the learning rates or the clipping norm"
             )));
         }
-        let gradients = total.backward();
         // schedules count from 0: with a warm-up the first update has rate 0, as the authors' has
         let configured = self.config.groups();
         let rates: Vec<_> = configured.iter().map(|(_, group)| group.learning_rate.at(step - 1)).collect();

@@ -3,6 +3,7 @@
 use super::*;
 use crate::panorama::{Panorama, Precision, WriteFormat, WriteOptions};
 use crate::sphere::Equirect;
+use crate::train::config::DecoderBy;
 use crate::train::loss::LossForm;
 use crate::train::presets::Preset;
 use crate::train::schedule::WeightSchedule;
@@ -254,7 +255,19 @@ fn gradients_match(run: &Path, config: TrainConfig) {
     let veni = trainer.network().clone();
     let batch = veni.source(trainer.config(), &trainer.splits.train).unwrap().prepare(1);
     let value = |veni: &Network| veni.terms(&batch, &trainer.loss, &trainer.device).total();
-    let gradients = weights::gradients(&veni, "", &value(&veni).backward());
+    let both = [DecoderBy::Tensors, DecoderBy::Kernels].map(|by| {
+        let (terms, gradients) = veni.gradients(&batch, &trainer.loss, by, &trainer.device);
+        (terms.total().into_scalar::<f32>(), weights::gradients(&veni, "", &gradients))
+    });
+    let [(loss, gradients), (kernel_loss, by_kernels)] = both;
+    assert!((loss - kernel_loss).abs() < 1e-5 * loss.abs(), "{loss} {kernel_loss}");
+    assert!(gradients.keys().eq(by_kernels.keys()));
+    for (name, gradient) in &gradients {
+        let largest = gradient.data.iter().fold(1e-4f32, |m, g| m.max(g.abs()));
+        for (a, b) in gradient.data.iter().zip(&by_kernels[name].data) {
+            assert!((a - b).abs() < 2e-4 * largest, "{name}: {a} by tensors, {b} by kernels");
+        }
+    }
     let start = weights::read(&veni, "");
     let mut checked = 0;
     for (slot, (name, gradient)) in (0..).zip(&gradients) {

@@ -9,7 +9,7 @@ pub mod veni;
 mod veni_tests;
 pub mod weights;
 
-pub use decoder::Decoder;
+pub use decoder::{Decoder, Native};
 pub use encoder::{Encoder, FoldedEncoder};
 pub use posterior::Posterior;
 pub use reni::{LatentTable, Reni};

@@ -10,8 +10,8 @@ pub(super) fn to_latent(weights: &Weights, folded: &Folded, sums: &Sums) -> Grad
     let n = weights.latent_vectors;
     let mut condition = vec![0.0f64; 3 * n];
     // the first layer's attention is added before it, every other one by the layer before
-    let attention = sums.attention.chunks_exact(weights.hidden);
-    for (layer, gradient) in weights.layers.iter().zip(attention) {
+    let added = sums.added.chunks_exact(weights.mlp.hidden);
+    for (layer, gradient) in weights.attention.iter().zip(added) {
         let inner = back(&layer.out, gradient);
         for (sum, value) in condition.iter_mut().zip(back(&layer.value, &inner)) {
             *sum += value;

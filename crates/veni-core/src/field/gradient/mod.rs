@@ -11,7 +11,15 @@
 
 mod backward;
 mod chain;
+mod outer;
+#[cfg(feature = "learn")]
+pub(crate) mod perceptron;
 mod transposed;
+#[cfg_attr(
+    not(feature = "learn"),
+    allow(dead_code, reason = "only training asks for the gradient by the weights")
+)]
+mod weight_sums;
 
 use rayon::prelude::*;
 
@@ -50,24 +58,24 @@ impl Field {
         loss: impl Fn(usize, [f32; 3]) -> (f64, [f32; 3]) + Sync,
     ) -> Gradient {
         let (weights, folded) = (&*self.weights, &*self.folded);
-        let transposed = weights.transposed();
+        let (mlp, n) = (&weights.mlp, weights.latent_vectors);
         let task = directions.len().div_ceil(TASKS).next_multiple_of(TASK).max(TASK);
         let tasks = directions.par_chunks(task).enumerate();
         let parts = tasks.map_init(Aligned::default, |scratch, (at, directions)| {
-            let mut sums = Sums::new(weights);
+            let mut sums = Sums::new(mlp, n);
             let (loss, first) = (&loss, at * task);
             pulp::Arch::new().dispatch(Backward {
-                weights,
-                transposed,
+                mlp,
                 folded,
                 directions,
                 loss: &|i, p| loss(first + i, p),
                 sums: &mut sums,
+                weights: None,
                 scratch,
             });
             sums
         });
-        let mut total = Sums::new(weights);
+        let mut total = Sums::new(mlp, n);
         // collected in order, added in order
         for part in parts.collect::<Vec<_>>() {
             total.add(&part);

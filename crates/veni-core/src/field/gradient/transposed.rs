@@ -1,6 +1,6 @@
 //! The matrices of the network the other way round.
 
-use crate::field::weights::{Matrix, Weights};
+use crate::field::mlp::{Matrix, Mlp};
 
 /// Transposes of the matrices that a gradient runs through.
 #[derive(Debug)]
@@ -14,14 +14,14 @@ pub(in crate::field) struct Transposed {
 }
 
 impl Transposed {
-    pub(in crate::field) fn new(weights: &Weights) -> Self {
-        let hidden = weights.hidden;
+    pub(in crate::field) fn new(mlp: &Mlp) -> Self {
+        let hidden = mlp.hidden;
         Self {
-            input: weights.input.iter().map(|chunk| chunk.weight.transposed(hidden)).collect(),
-            layers: (weights.layers.iter())
+            input: mlp.input.iter().map(|chunk| chunk.weight.transposed(hidden)).collect(),
+            layers: (mlp.layers.iter())
                 .map(|layer| [layer.ff1.transposed(hidden), layer.ff2.transposed(hidden)])
                 .collect(),
-            output: weights.output.transposed(3),
+            output: mlp.output.transposed(3),
         }
     }
 }

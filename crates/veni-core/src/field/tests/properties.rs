@@ -181,9 +181,9 @@ fn every_simd_width_gives_the_same_result() {
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
             let mut out = vec![[0.0; 3]; self.1.len()];
-            let (weights, folded) = (&*self.0.weights, &*self.0.folded);
+            let (mlp, folded) = (&self.0.weights.mlp, &*self.0.folded);
             let scratch = &mut Aligned::default();
-            Blocks { weights, folded, directions: self.1, out: &mut out, log: true, scratch }.with_simd(simd);
+            Blocks { mlp, folded, directions: self.1, out: &mut out, log: true, scratch }.with_simd(simd);
             out
         }
     }

@@ -97,7 +97,7 @@ pub struct Term {
 /// The weighted terms that were computed.
 #[derive(Clone, Debug)]
 pub struct LossTerms {
-    /// In the order of [`LossConfig`].
+    /// Of the image in the order of [`LossConfig`], then of the posterior.
     pub terms: Vec<Term>,
 }
 
@@ -152,9 +152,9 @@ impl Loss {
         Self { config: *config, rows: Tensor::ones([1, rays, 1, 1], device), mage: None, rays: true }
     }
 
-    /// All terms whose weight in `step` is not 0. Images `[B, H, W, 3]`; `posterior` is the encoder's
-    /// (mean `[B, N, 3]`, log variance `[B, N, 1]`) or, per coordinate, an auto-decoder's (`[B, N, 3]` both); absent
-    /// in evaluation.
+    /// All terms whose weight in `step` is not 0, those of the image first. Images `[B, H, W, 3]`; `posterior` is the
+    /// encoder's (mean `[B, N, 3]`, log variance `[B, N, 1]`) or, per coordinate, an auto-decoder's (`[B, N, 3]`
+    /// both); absent in evaluation.
     pub fn terms(
         &self,
         step: u64,
@@ -162,6 +162,26 @@ impl Loss {
         target: Tensor<4>,
         posterior: Option<(Tensor<3>, Tensor<3>)>,
     ) -> LossTerms {
+        let mut terms = self.image_terms(step, prediction, target);
+        terms.terms.extend(posterior.and_then(|(mean, log_variance)| self.kld(step, mean, log_variance)));
+        terms
+    }
+
+    /// The divergence of the posterior from the prior, if its weight in `step` is not 0. Shapes as in
+    /// [`Loss::terms`].
+    pub fn kld(&self, step: u64, mean: Tensor<3>, log_variance: Tensor<3>) -> Option<Term> {
+        let weight = self.config.kld.at(step);
+        (weight != 0.0).then(|| {
+            let value = match log_variance.dims()[2] {
+                3 => kld::per_coordinate(mean, log_variance),
+                _ => kld::isotropic(mean, log_variance).mean(),
+            };
+            Term { name: "kld", value: value * weight }
+        })
+    }
+
+    /// The terms that compare images.
+    pub fn image_terms(&self, step: u64, prediction: Tensor<4>, target: Tensor<4>) -> LossTerms {
         let (config, form) = (&self.config, self.config.form);
         let images = || (prediction.clone(), target.clone(), self.rows.clone());
         let error = |space: Space| {
@@ -198,15 +218,6 @@ impl Loss {
                 LossForm::Reference => cosine::reference(p, i, rows),
             }
         });
-        if let Some((mean, log_variance)) = &posterior {
-            put("kld", &config.kld, &|| {
-                let (mean, log_variance) = (mean.clone(), log_variance.clone());
-                match log_variance.dims()[2] {
-                    3 => kld::per_coordinate(mean, log_variance),
-                    _ => kld::isotropic(mean, log_variance).mean(),
-                }
-            });
-        }
         put("log_mse", &config.log_mse, &|| error(Space::Log));
         put("hdr_mse", &config.hdr_mse, &|| error(Space::Hdr));
         put("ldr_mse", &config.ldr_mse, &|| error(Space::Ldr));

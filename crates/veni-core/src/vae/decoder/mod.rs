@@ -17,6 +17,7 @@ mod input;
 mod invariants;
 mod layer;
 mod linear;
+mod native;
 mod output;
 mod sine;
 #[cfg(test)]
@@ -27,6 +28,7 @@ pub use condition::Condition;
 pub use import::reni_2022_inputs;
 pub use layer::{Layer, Norm};
 pub use linear::Linear;
+pub use native::Native;
 pub use tokens::{Memory, TokenLayer, Tokens};
 
 use crate::model::{Conditioning, DecoderConfig};

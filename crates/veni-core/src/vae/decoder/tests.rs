@@ -202,4 +202,5 @@ fn a_latent_of_another_size_is_refused() {
     decoder(VnReluForm::Projection, &device).forward(Tensor::zeros([1, 5, 3], &device), directions(&device));
 }
 
+mod kernels;
 mod systems;
