@@ -3,6 +3,8 @@
 //! One file per command in [`commands`]; what they share is beside this file. Results go to stdout,
 //! everything else to stderr; exit codes are 0 (fine), 1 (ran, negative outcome), 2 (error).
 
+#[cfg(feature = "learn")]
+mod allocator;
 mod args;
 mod commands;
 mod device;
@@ -19,11 +21,6 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::report::{Outcome, Report};
-
-/// Training allocates and frees tensors all the time, which this allocator does faster than most systems' own.
-#[cfg(feature = "learn")]
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> ExitCode {
     let cli = args::Cli::parse();

@@ -152,6 +152,7 @@ impl From<TrainDevice> for DeviceKind {
 
 impl Train {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        crate::allocator::keep_memory();
         let started = Instant::now();
         let mut trainer = if self.resume { self.continued()? } else { self.begun()? };
         let stop = stop_on_signal()?;

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::Codec;
 use crate::eval::fitting::FitSettings;
+use crate::eval::metrics::{Alignment, scores};
 use crate::eval::reconstruction::Start;
 use crate::eval::subject::Subject;
 use crate::latent::Latent;
@@ -23,7 +24,8 @@ impl<'a> Autoencoder<'a> {
     }
 }
 
-/// A latent optimised for each image under the fixed decoder.
+/// A latent optimised for each image under the fixed decoder. The fit lowers log error, which may cost display error:
+/// where the encoder's latent has the higher LDR PSNR, it stays.
 #[derive(Clone, Copy, Debug)]
 pub struct Optimised<'a> {
     subject: &'a Subject,
@@ -36,6 +38,12 @@ impl<'a> Optimised<'a> {
     pub fn new(subject: &'a Subject, settings: FitSettings) -> Self {
         let start = if subject.veni().is_some() { Start::Encoder } else { Start::Zero };
         Self { subject, settings, start }
+    }
+
+    /// LDR PSNR of one latent under exposure alignment.
+    fn display_score(&self, grid: Equirect, image: &[f32], latent: &[Latent]) -> Result<f64> {
+        let decoded = self.subject.decode(grid, latent)?.concat();
+        Ok(scores(&decoded, image, grid.height, grid.width, Alignment::Exposure).psnr_ldr)
     }
 }
 
@@ -88,6 +96,7 @@ impl Codec for Optimised<'_> {
             "pass": "optimised",
             "start": start,
             "fit": self.settings.key(),
+            "keeps": "the higher LDR PSNR",
         })
     }
 
@@ -97,7 +106,10 @@ impl Codec for Optimised<'_> {
             Start::Zero => vec![Latent::new(vec![[0.0; 3]; self.subject.latent_vectors()])],
         };
         let fitted = self.settings.fit(self.subject, grid, &[image], &start);
-        Ok(numbers(fitted.map_err(|e| Error::invalid(format!("{}: {e}", self.subject.name())))?.latents))
+        let fitted = fitted.map_err(|e| Error::invalid(format!("{}: {e}", self.subject.name())))?.latents;
+        let keep = self.start == Start::Encoder
+            && self.display_score(grid, image, &start)? > self.display_score(grid, image, &fitted)?;
+        Ok(numbers(if keep { start } else { fitted }))
     }
 
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>> {

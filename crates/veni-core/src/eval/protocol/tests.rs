@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::*;
 use crate::data::random::{Purpose, stream};
 use crate::data::{Dataset, Item};
-use crate::eval::metrics::{log_error, spearman, weighted_log_error};
+use crate::eval::metrics::{Alignment, log_error, scores, spearman, weighted_log_error};
 use crate::eval::table::Cell;
 use crate::model::{DecoderConfig, EncoderConfig, Model, ModelConfig, ModelInfo, ModelKind};
 use crate::sphere::Equirect;
@@ -348,4 +348,27 @@ fn the_light_on_a_ball_is_found_from_the_picture_alone() {
     };
     assert!(loss(&first) < 0.5 * loss(&foreign), "{} {}", loss(&first), loss(&foreign));
     assert_eq!(first.figures.len(), 2);
+}
+
+/// A fit with steps so wide that it mostly makes things worse.
+#[test]
+fn the_optimised_pass_never_scores_below_the_encoders() {
+    let (subject, data) = (subject("a", 1), skies(6));
+    let mut settings = FitSettings::thorough(GRID, true);
+    settings.config.steps = 3;
+    settings.config.learning_rate = crate::train::schedule::LearningRate::Constant { rate: 2.0 };
+    let (first, second) = (Autoencoder::new(&subject).unwrap(), Optimised::new(&subject, settings));
+    let (mut kept, mut moved) = (0, 0);
+    for item in data.items() {
+        let image = &item.log_radiance;
+        let codes = [&first as &dyn Codec, &second].map(|codec| codec.encode(GRID, image).unwrap());
+        let [before, after] = codes.each_ref().map(|code| {
+            let decoded = first.decode(GRID, code).unwrap();
+            scores(&decoded, image, GRID.height, GRID.width, Alignment::Exposure).psnr_ldr
+        });
+        assert!(after >= before, "{}: {before} became {after}", item.name());
+        if codes[0] == codes[1] { kept += 1 } else { moved += 1 }
+    }
+    // the rule acts, and does not always
+    assert!(kept > 0, "{kept} kept, {moved} moved");
 }

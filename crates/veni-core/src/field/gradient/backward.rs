@@ -1,13 +1,15 @@
 //! One task: its directions in blocks, each forward with its activations kept, then backward.
 
-use std::f32::consts::TAU;
-
 use pulp::{Simd, WithSimd};
 
+use super::operations::{
+    accumulate, accumulate_product, accumulate_products, decode, mask, scale_and_shift, standardise,
+    unstandardise,
+};
 use super::weight_sums::{WeightRoom, WeightSums, vector};
 use crate::field::Folded;
 use crate::field::aligned::Aligned;
-use crate::field::block::{EPSILON, Row, VECTORS, encode, moments, product, scatter};
+use crate::field::block::{Row, VECTORS, encode, product, scatter};
 use crate::field::mlp::{Mlp, PANEL};
 
 /// ℓ and its derivatives by log radiance, given the direction's index and log radiance.
@@ -221,130 +223,4 @@ impl WithSimd for Backward<'_> {
             room.drain(mlp, sums);
         }
     }
-}
-
-/// (x − mean)/√(variance + ε) over the rows into `out`; returns 1/√(variance + ε).
-#[inline(always)]
-fn standardise<S: Simd>(simd: S, x: &[Row<S>], out: &mut [Row<S>]) -> Row<S> {
-    let (mean, mut scale) = moments(simd, x);
-    for scale in &mut scale {
-        let variance = simd.add_f32s(*scale, simd.splat_f32s(EPSILON));
-        *scale = simd.div_f32s(simd.splat_f32s(1.0), simd.sqrt_f32s(variance));
-    }
-    for (out, x) in out.iter_mut().zip(x) {
-        for v in 0..VECTORS {
-            out[v] = simd.mul_f32s(simd.sub_f32s(x[v], mean[v]), scale[v]);
-        }
-    }
-    scale
-}
-
-/// γ x̂ + shift into `out`.
-#[inline(always)]
-fn scale_and_shift<S: Simd>(simd: S, x: &[Row<S>], gamma: &[f32], shift: &[f32], out: &mut [Row<S>]) {
-    for (((out, x), gamma), shift) in out.iter_mut().zip(x).zip(gamma).zip(shift) {
-        let (gamma, shift) = (simd.splat_f32s(*gamma), simd.splat_f32s(*shift));
-        for v in 0..VECTORS {
-            out[v] = simd.mul_add_e_f32s(x[v], gamma, shift);
-        }
-    }
-}
-
-/// Backward of γ x̂ + shift, x̂ = (x − mean)·s: with g = γ ⊙ gradient, s (g − mean g − x̂ · mean(g x̂)).
-#[inline(always)]
-fn unstandardise<S: Simd>(
-    simd: S,
-    gradient: &mut [Row<S>],
-    gamma: &[f32],
-    standard: &[Row<S>],
-    scale: Row<S>,
-) {
-    let zero = simd.splat_f32s(0.0);
-    let (mut mean, mut slope) = ([zero; VECTORS], [zero; VECTORS]);
-    for ((g, gamma), x) in gradient.iter_mut().zip(gamma).zip(standard) {
-        let gamma = simd.splat_f32s(*gamma);
-        for v in 0..VECTORS {
-            g[v] = simd.mul_f32s(g[v], gamma);
-            mean[v] = simd.add_f32s(mean[v], g[v]);
-            slope[v] = simd.mul_add_e_f32s(g[v], x[v], slope[v]);
-        }
-    }
-    let count = simd.splat_f32s(1.0 / standard.len() as f32);
-    for v in 0..VECTORS {
-        mean[v] = simd.mul_f32s(mean[v], count);
-        slope[v] = simd.mul_f32s(slope[v], count);
-    }
-    for (g, x) in gradient.iter_mut().zip(standard) {
-        for v in 0..VECTORS {
-            let inside = simd.sub_f32s(simd.sub_f32s(g[v], mean[v]), simd.mul_f32s(x[v], slope[v]));
-            g[v] = simd.mul_f32s(inside, scale[v]);
-        }
-    }
-}
-
-/// Backward of the ReLU: nothing passes where a unit is 0.
-#[inline(always)]
-fn mask<S: Simd>(simd: S, gradient: &mut [Row<S>], units: &[Row<S>]) {
-    let zero = simd.splat_f32s(0.0);
-    for (g, unit) in gradient.iter_mut().zip(units) {
-        for v in 0..VECTORS {
-            g[v] = simd.select_f32s(simd.greater_than_f32s(unit[v], zero), g[v], zero);
-        }
-    }
-}
-
-/// Adds the rows, their vectors together, to one vector each.
-#[inline(always)]
-fn accumulate<S: Simd>(simd: S, rows: &[Row<S>], sums: &mut [S::f32s]) {
-    for (sum, row) in sums.iter_mut().zip(rows) {
-        *sum = simd.add_f32s(*sum, simd.add_f32s(row[0], simd.add_f32s(row[1], row[2])));
-    }
-}
-
-/// Adds to each sum the products of a row of `a` and of `b`, their vectors together.
-#[inline(always)]
-fn accumulate_products<S: Simd>(simd: S, a: &[Row<S>], b: &[Row<S>], sums: &mut [S::f32s]) {
-    for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-        *sum = accumulate_product(simd, *sum, a, b);
-    }
-}
-
-#[inline(always)]
-fn accumulate_product<S: Simd>(simd: S, sum: S::f32s, a: &Row<S>, b: &Row<S>) -> S::f32s {
-    (0..VECTORS).fold(sum, |sum, v| simd.mul_add_e_f32s(a[v], b[v], sum))
-}
-
-/// Backward of the encoding: d⟨z, d⟩ of every latent vector, times d_x and d_y, into `sums` [N, 2].
-#[inline(always)]
-fn decode<S: Simd>(
-    simd: S,
-    inputs: std::ops::Range<usize>,
-    features: &[Row<S>],
-    gradient: &[Row<S>],
-    direction: &[Row<S>],
-    sums: &mut [S::f32s],
-) {
-    let (features, _) = features.as_chunks::<5>();
-    let (gradient, _) = gradient.as_chunks::<5>();
-    let (pairs, _) = sums.as_chunks_mut::<2>();
-    let (slow, fast) = (simd.splat_f32s(TAU), simd.splat_f32s(4.0 * TAU));
-    // the last two inputs, d_z and |d_xy|, are beyond the latent's vectors
-    for ((j, [sin1, sin4, cos1, cos4, _]), [g_sin1, g_sin4, g_cos1, g_cos4, g]) in
-        inputs.zip(features).zip(gradient)
-    {
-        let Some([dx, dy]) = pairs.get_mut(j) else { return };
-        for v in 0..VECTORS {
-            let one = turn(simd, [g_sin1[v], g_cos1[v]], [sin1[v], cos1[v]]);
-            let four = turn(simd, [g_sin4[v], g_cos4[v]], [sin4[v], cos4[v]]);
-            let p = simd.mul_add_e_f32s(one, slow, simd.mul_add_e_f32s(four, fast, g[v]));
-            *dx = simd.mul_add_e_f32s(p, direction[0][v], *dx);
-            *dy = simd.mul_add_e_f32s(p, direction[1][v], *dy);
-        }
-    }
-}
-
-/// Backward of (sin a, cos a), by a.
-#[inline(always)]
-fn turn<S: Simd>(simd: S, [g_sin, g_cos]: [S::f32s; 2], [sin, cos]: [S::f32s; 2]) -> S::f32s {
-    simd.sub_f32s(simd.mul_f32s(g_sin, cos), simd.mul_f32s(g_cos, sin))
 }

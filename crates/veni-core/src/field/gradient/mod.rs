@@ -11,6 +11,7 @@
 
 mod backward;
 mod chain;
+mod operations;
 mod outer;
 #[cfg(feature = "learn")]
 pub(crate) mod perceptron;
