@@ -1,6 +1,11 @@
 //! Whole runs of the tiny preset on synthetic skies.
 
+use std::fs;
+
 use super::*;
+use crate::data::random::{Purpose, stream};
+use crate::latent::Latent;
+use crate::model::Model;
 use crate::panorama::{Panorama, Precision, WriteFormat, WriteOptions};
 use crate::sphere::Equirect;
 use crate::train::loss::LossForm;
@@ -253,7 +258,7 @@ fn gradients_match(run: &Path, config: TrainConfig) {
     let trainer = Trainer::create(run, config, "test").unwrap();
     let veni = trainer.network().clone();
     let batch = veni.source(trainer.config(), &trainer.splits.train).unwrap().prepare(1);
-    let value = |veni: &Network| veni.terms(&batch, &trainer.loss, &trainer.device).total();
+    let value = |veni: &Network| veni.terms(&batch, &trainer.stages[0].loss, &trainer.device).total();
     let gradients = weights::gradients(&veni, "", &value(&veni).backward());
     let start = weights::read(&veni, "");
     let mut checked = 0;
