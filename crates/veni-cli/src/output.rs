@@ -11,6 +11,7 @@ use veni_core::output::{Overwrite, process_token, refuse_existing};
 use veni_core::panorama::{WriteOptions, write_rows};
 use veni_core::sphere::Equirect;
 
+#[cfg(feature = "learn")]
 use crate::shard::Shard;
 
 /// Attribute of a baked image: the latent's JSON.
@@ -51,6 +52,7 @@ pub(crate) fn check(paths: &[PathBuf], extensions: &[&str], overwrite: Overwrite
 /// Where the results for `inputs` go: to the single `output`, or into `folder` under the inputs' names with another
 /// extension; nowhere (stdout) if neither is given. Those of this process's share are checked before any work; the
 /// names of all of them must differ.
+#[cfg(feature = "learn")]
 pub(crate) fn one_per_input(
     inputs: &[PathBuf],
     output: Option<&PathBuf>,

@@ -2,6 +2,7 @@
 
 use std::fmt::{self, Display};
 
+#[cfg(feature = "learn")]
 use anyhow::{Result, bail};
 use clap::Args;
 
@@ -28,11 +29,6 @@ impl Shard {
         self.part.is_none_or(|part| index % part.of == part.number - 1)
     }
 
-    /// Whether other processes do the rest.
-    pub(crate) fn is_part(self) -> bool {
-        self.part.is_some_and(|part| part.of > 1)
-    }
-
     /// (I − 1, N) of I/N; (0, 1) for everything.
     pub(crate) fn place(self) -> (usize, usize) {
         self.part.map_or((0, 1), |part| (part.number - 1, part.of))
@@ -48,19 +44,27 @@ impl Shard {
             .collect()
     }
 
+    /// Says, if it is so, that there are fewer inputs than processes.
+    pub(crate) fn note_idle(self, inputs: usize, report: Report) {
+        if self.part.is_some_and(|part| part.number > inputs) {
+            report.note(format_args!("--shard {self}: nothing to do, there are {inputs} inputs"));
+        }
+    }
+}
+
+#[cfg(feature = "learn")]
+impl Shard {
+    /// Whether other processes do the rest.
+    pub(crate) fn is_part(self) -> bool {
+        self.part.is_some_and(|part| part.of > 1)
+    }
+
     /// Refuses `option`, whose single file every process would write.
     pub(crate) fn refuse(self, option: &str, given: bool) -> Result<()> {
         if given && self.is_part() {
             bail!("{option}: every shard would write this file; leave it out, or --shard");
         }
         Ok(())
-    }
-
-    /// Says, if it is so, that there are fewer inputs than processes.
-    pub(crate) fn note_idle(self, inputs: usize, report: Report) {
-        if self.part.is_some_and(|part| part.number > inputs) {
-            report.note(format_args!("--shard {self}: nothing to do, there are {inputs} inputs"));
-        }
     }
 }
 
@@ -100,7 +104,7 @@ mod tests {
         }
         assert_eq!(shard("2/3").own(&[0, 1, 2, 3, 4]), [1, 4]);
         assert_eq!((shard("2/3").place(), shard("2/3").to_string().as_str()), ((1, 3), "2/3"));
-        assert!((0..9).all(|index| Shard::default().pick(index)) && !shard("1/1").is_part());
+        assert!((0..9).all(|index| Shard::default().pick(index)));
     }
 
     #[test]

@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use veni_core::output::{Overwrite, refuse_existing};
 
 use crate::output;
+use crate::report::Report;
 use crate::shard::Shard;
 
 /// Extensions that can be written.
@@ -92,11 +93,13 @@ pub(crate) fn jobs(
     target: &Target,
     many: &Many,
     overwrite: Overwrite,
+    report: Report,
 ) -> Result<Vec<Job>> {
     let skies = match seed {
         Some(seed) => random(seed, many.count.unwrap_or(1))?,
         None => files.iter().cloned().map(Sky::File).collect(),
     };
+    many.shard.note_idle(skies.len(), report);
     let Some(folder) = &target.out_dir else {
         if skies.len() > 1 {
             bail!("-o names the images of one sky, not of {}: name a folder with --out-dir DIR", skies.len());

@@ -140,7 +140,7 @@ pub(crate) enum FrameName {
 impl Bake {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
         let overwrite = Overwrite::from(self.force);
-        let jobs = skies::jobs(&self.latents, self.seed, &self.target, &self.many, overwrite)?;
+        let jobs = skies::jobs(&self.latents, self.seed, &self.target, &self.many, overwrite, report)?;
         let picture = Picture::new(self.layout, self.frame, self.size)?;
         let loaded = source::model(&self.model)?;
         loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;

@@ -136,7 +136,7 @@ pub(crate) struct RenderProbe {
 impl RenderProbe {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
         let overwrite = Overwrite::from(self.force);
-        let jobs = skies::jobs(&self.sources, self.seed, &self.target, &self.many, overwrite)?;
+        let jobs = skies::jobs(&self.sources, self.seed, &self.target, &self.many, overwrite, report)?;
         let size = self.check(&jobs, overwrite)?;
         let angles = [self.azimuth.to_radians(), self.elevation.to_radians()];
         let (surface, camera) = match &self.mesh {

@@ -1,6 +1,7 @@
 //! `veni-cli train`: a model from a folder of panoramas.
 
 mod config;
+mod folder;
 mod watch;
 
 use std::path::{Path, PathBuf};
@@ -11,23 +12,18 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use veni_core::Error;
 use veni_core::model::ModelKind;
 use veni_core::train::config::DeviceKind;
 use veni_core::train::init::Initialised;
 use veni_core::train::presets::Preset;
-use veni_core::train::run::{Finish, Trainer, is_free, leftovers};
+use veni_core::train::run::{Finish, Trainer};
 
 use crate::commands::inspect::run::{self, Best};
 use crate::loading::Loading;
-use crate::output::{folder_of, with_remedy, writable};
+use crate::output::with_remedy;
 use crate::progress::duration;
 use crate::report::{Outcome, Report, to_stderr};
 use watch::Watch;
-
-/// What a run writes into its folder.
-const FILES: [&str; 4] = ["config.toml", "metrics.jsonl", "model.safetensors", "latents.safetensors"];
-const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
 
 /// Train a model on HDR panoramas
 #[derive(Args, Debug)]
@@ -238,57 +234,6 @@ impl Train {
         Ok(trainer?)
     }
 
-    /// Refuses a folder in use before the data is read. Whether there is a run to clear away (`--force`).
-    fn check_folder(&self) -> Result<bool> {
-        let out = &self.out;
-        if !out.exists() {
-            return writable(existing_above(out), out).map(|()| false);
-        }
-        if !out.is_dir() {
-            bail!("{}: is a file; name a folder for the run with --out", out.display());
-        }
-        writable(out, out)?;
-        if is_free(out)? {
-            return Ok(false);
-        }
-        if !out.join("config.toml").is_file() {
-            bail!("{}: is not empty and no run either; name a new folder with --out", out.display());
-        }
-        if !self.force {
-            bail!(
-                "{}: holds a run already; --resume continues it, --force begins anew in its place",
-                out.display()
-            );
-        }
-        let left = leftovers(out)?;
-        for entry in std::fs::read_dir(out).map_err(|e| Error::io(out, "list", e))? {
-            let entry = entry.map_err(|e| Error::io(out, "list", e))?;
-            let name = entry.file_name();
-            if !left.contains(&entry.path()) && !FILES.iter().chain(&FOLDERS).any(|known| name == *known) {
-                bail!(
-                    "{}: holds {} beside its run; name a new folder with --out",
-                    out.display(),
-                    name.display()
-                );
-            }
-        }
-        Ok(true)
-    }
-
-    /// Removes a run's files.
-    fn clear(&self) -> Result<()> {
-        for file in leftovers(&self.out)? {
-            remove(&file, |p| std::fs::remove_file(p))?;
-        }
-        for file in FILES {
-            remove(&self.out.join(file), |p| std::fs::remove_file(p))?;
-        }
-        for folder in FOLDERS {
-            remove(&self.out.join(folder), |p| std::fs::remove_dir_all(p))?;
-        }
-        Ok(())
-    }
-
     fn report(
         &self,
         report: Report,
@@ -320,22 +265,6 @@ impl Train {
         });
         report.result(human, &value)
     }
-}
-
-/// The nearest folder above that exists.
-fn existing_above(path: &Path) -> &Path {
-    let mut folder = folder_of(path);
-    while !folder.exists() && folder != Path::new(".") {
-        folder = folder_of(folder);
-    }
-    folder
-}
-
-fn remove(path: &Path, how: impl Fn(&Path) -> std::io::Result<()>) -> Result<()> {
-    if path.exists() {
-        how(path).map_err(|e| Error::io(path, "remove", e))?;
-    }
-    Ok(())
 }
 
 /// Raised by the first Ctrl-C (or a request to terminate); the second one ends the process.

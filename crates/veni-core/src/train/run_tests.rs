@@ -385,7 +385,10 @@ fn accumulated_gradients_are_those_of_the_whole_batch() {
             for (name, value) in &whole.parts {
                 // a mean whose largest terms are a sun's rounds at 1.5e-5
                 let other = sum.parts[name];
-                assert!((other - value).abs() < 1e-4 * value, "{form:?}, {parts} parts, {name}: {other} {value}");
+                assert!(
+                    (other - value).abs() < 1e-4 * value,
+                    "{form:?}, {parts} parts, {name}: {other} {value}"
+                );
             }
             let distance = distance(&sum, &whole);
             assert!(distance < 1e-4, "{form:?}, {parts} parts: {distance}");
