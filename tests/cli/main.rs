@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod bake;
+mod crashes;
 mod encode;
 mod evaluate;
 mod fit;
@@ -11,5 +12,6 @@ mod gpu;
 mod inspect;
 mod readers;
 mod render_probe;
+mod shards;
 mod training;
 mod util;

@@ -3,7 +3,7 @@
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::util::{Dir, Run, panoramas, text, train_args};
+use crate::util::{Dir, Run, model, panoramas, text, train_args};
 
 /// More than are made before a run is interrupted, few enough to wait for.
 const STEPS: &str = "60";
@@ -231,4 +231,110 @@ fn a_log_gets_few_plain_lines() {
     assert!(run.err.lines().count() < 10, "{}", run.err);
     assert!(run.err.contains("LDR PSNR val"), "{}", run.err);
     assert_eq!(run.out.lines().count(), 1);
+}
+
+/// The training entry of a run's model.
+fn training(dir: &Dir, run: &str) -> serde_json::Value {
+    dir.json(&["inspect", &format!("{run}/model.safetensors")])[0]["training"].clone()
+}
+
+#[test]
+fn a_run_begins_with_the_weights_of_a_model() {
+    let dir = Dir::new();
+    let data = text(panoramas());
+    // no update at all: the run's model is the one it began with
+    let none = [&train_args(&data, "none", "0")[..], &["--init", model()]].concat();
+    let full = veni_core::model::Model::load(model()).unwrap();
+    dir.ok(&none);
+    assert_eq!(weights_of(&dir, "none", "encoder."), tensors(&full, "encoder."));
+    assert_eq!(weights_of(&dir, "none", "decoder."), tensors(&full, "decoder."));
+    let init = training(&dir, "none")["init"].as_str().unwrap().to_owned();
+    assert!(init.starts_with("run/model.safetensors ") && init.ends_with(&full.digest()), "{init}");
+    let config = std::fs::read_to_string(dir.path("none/config.toml")).unwrap();
+    assert!(config.contains("[init]") && config.contains(&full.digest()), "{config}");
+
+    // a decoder alone, in both systems, and said so
+    full.clone()
+        .without_encoder()
+        .save(dir.path("bare.safetensors"), veni_core::model::StoredType::F32, Default::default())
+        .unwrap();
+    for (system, word) in [("veni", "no encoder"), ("reni++", "auto-decoder")] {
+        let mut args = train_args(&data, system, "0");
+        args.retain(|arg| *arg != "--quiet");
+        let run = dir.run(&[&args[..], &["--init", "bare.safetensors", "--system", system]].concat());
+        assert!(run.code == Some(0) && run.err.contains("only its decoder"), "{}", run.err);
+        assert!(run.err.contains(word), "{}", run.err);
+        assert_eq!(weights_of(&dir, system, "decoder."), tensors(&full, "decoder."));
+    }
+    // to go on, the model is not needed any more
+    dir.ok(&[&args(&data, "parts")[..], &["--init", "bare.safetensors"]].concat());
+    let mut child =
+        dir.command(&[&args(&data, "again")[..], &["--init", "bare.safetensors"]].concat()).spawn().unwrap();
+    while !dir.path("again/config.toml").exists() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    std::fs::remove_file(dir.path("bare.safetensors")).unwrap();
+    dir.ok(&["train", "--resume", "--out", "again", "-q"]);
+    assert_eq!(weights(&dir, "parts"), weights(&dir, "again"));
+    // but it is to repeat the run
+    let repeat = ["train", "--config", "again/config.toml", "--out", "third", "-q"];
+    dir.refused(&repeat, &["bare.safetensors"]);
+}
+
+fn tensors(model: &veni_core::model::Model, prefix: &str) -> Vec<(String, Vec<f32>)> {
+    let inside = model.tensors().iter().filter(|(name, _)| name.starts_with(prefix));
+    inside.map(|(name, tensor)| (name.clone(), tensor.data.clone())).collect()
+}
+
+fn weights_of(dir: &Dir, run: &str, prefix: &str) -> Vec<(String, Vec<f32>)> {
+    tensors(&veni_core::model::Model::load(dir.path(run).join("model.safetensors")).unwrap(), prefix)
+}
+
+#[test]
+fn a_model_that_does_not_fit_is_refused_with_its_remedy() {
+    let dir = Dir::new();
+    let data = text(panoramas());
+    let run = train_args(&data, "run", "1");
+    let refused = |more: &[&str], words: &[&str]| {
+        dir.refused(
+            &[&run[..], &["--init", model()], more].concat(),
+            &[&["model.safetensors"], words].concat(),
+        );
+    };
+    refused(&["--set", "model.decoder.hidden=32"], &["tensor decoder.", "--set model.decoder.hidden=16"]);
+    refused(&["--set", "model.encoder.channels=32"], &["tensor encoder.", "--set model.encoder.channels=16"]);
+    refused(&["--set", "model.latent_vectors=5"], &["tensor decoder.", "--latent-vectors 4"]);
+    dir.refused(&[&run[..], &["--init", "nowhere.safetensors"]].concat(), &["nowhere.safetensors"]);
+    // a run in that place survives it
+    dir.ok(&run);
+    let before = weights(&dir, "run");
+    refused(&["--force", "--set", "model.decoder.layers=3"], &["tensor decoder."]);
+    assert_eq!(weights(&dir, "run"), before);
+}
+
+#[test]
+fn pretraining_and_finetuning_are_one_command() {
+    let dir = Dir::new();
+    let (data, first) = (text(panoramas()), text(&panoramas().join("train")));
+    let mut args = train_args(&data, "run", "3");
+    args.retain(|arg| *arg != "--quiet");
+    let more = ["--pretrain", &first, "--pretrain-steps", "2", "--set", "accumulate=2", "--set"];
+    let run = dir.run(&[&args[..], &more, &["stage.finetune.batch=4"]].concat());
+    assert!(run.code == Some(0) && run.out.contains("5 steps"), "{}{}", run.out, run.err);
+    let log = std::fs::read_to_string(dir.path("run/metrics.jsonl")).unwrap();
+    let lines: Vec<serde_json::Value> = log.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let stages: Vec<_> = lines.iter().filter_map(|line| line["stage"].as_str()).collect();
+    assert_eq!(stages, ["pretrain", "pretrain", "finetune", "finetune", "finetune"]);
+    let training = training(&dir, "run");
+    assert_eq!(training["data"], "8 panoramas of panoramas; pretrain: train");
+    assert!(training["command"].as_str().unwrap().contains("--pretrain train"), "{training}");
+    let config = std::fs::read_to_string(dir.path("run/config.toml")).unwrap();
+    assert!(config.contains("name = \"finetune\"") && config.contains("rate = 0.0003"), "{config}");
+    dir.ok(&["train", "--config", "run/config.toml", "--out", "again", "-q"]);
+    assert_eq!(weights(&dir, "run"), weights(&dir, "again"));
+    let reni = train_args(&data, "reni", "2");
+    let reni = [&reni[..], &["--system", "reni++", "--pretrain", &first]].concat();
+    dir.refused(&reni, &["--pretrain", "--init"]);
 }

@@ -8,12 +8,16 @@ mod allocator;
 mod args;
 mod commands;
 mod device;
+#[cfg(feature = "learn")]
+mod loading;
 mod output;
 mod picture;
 mod progress;
 mod report;
+mod shard;
 mod sheet;
 mod size;
+mod skies;
 mod source;
 
 use std::process::ExitCode;

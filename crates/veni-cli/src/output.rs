@@ -1,14 +1,18 @@
 //! Output files: what is checked before any work, and rows written to several files at once.
 
+use std::collections::HashSet;
 use std::fs::OpenOptions;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use veni_core::Error;
-use veni_core::output::{Overwrite, refuse_existing};
+use veni_core::output::{Overwrite, process_token, refuse_existing};
 use veni_core::panorama::{WriteOptions, write_rows};
 use veni_core::sphere::Equirect;
+
+#[cfg(feature = "learn")]
+use crate::shard::Shard;
 
 /// Attribute of a baked image: the latent's JSON.
 pub(crate) const LATENT: &str = "veni:latent";
@@ -28,6 +32,7 @@ pub(crate) const MATERIAL: &str = "veni:material";
 /// `extensions`, a folder that is missing or cannot be written to, a name given twice.
 pub(crate) fn check(paths: &[PathBuf], extensions: &[&str], overwrite: Overwrite) -> Result<()> {
     check_distinct(paths)?;
+    let mut probed = HashSet::new();
     for path in paths {
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         if !extension.as_deref().is_some_and(|e| extensions.contains(&e)) {
@@ -37,13 +42,16 @@ pub(crate) fn check(paths: &[PathBuf], extensions: &[&str], overwrite: Overwrite
             bail!("{}: is a folder; name a file in it", path.display());
         }
         refuse_existing(path, overwrite)?;
-        writable(folder_of(path), path)?;
+        if probed.insert(folder_of(path)) {
+            writable(folder_of(path), path)?;
+        }
     }
     Ok(())
 }
 
-/// Where the results for `inputs` go, checked before any work: to the single `output`, or into `folder` under the
-/// inputs' names with another extension; nowhere (stdout) if neither is given.
+/// Where the results for `inputs` go: to the single `output`, or into `folder` under the inputs' names with another
+/// extension; nowhere (stdout) if neither is given. Those of this process's share are checked before any work; the
+/// names of all of them must differ.
 #[cfg(feature = "learn")]
 pub(crate) fn one_per_input(
     inputs: &[PathBuf],
@@ -51,33 +59,41 @@ pub(crate) fn one_per_input(
     folder: Option<&PathBuf>,
     extension: &str,
     overwrite: Overwrite,
+    shard: Shard,
 ) -> Result<Vec<PathBuf>> {
-    let outputs = match (output, folder) {
+    let names = match (output, folder) {
         (Some(_), _) if inputs.len() > 1 => {
             bail!("-o names one file for {} inputs: name a folder with --out-dir DIR", inputs.len())
         }
         (Some(output), _) => vec![output.clone()],
         (None, None) => return Ok(Vec::new()),
-        (None, Some(folder)) => {
-            let file = |input: &PathBuf| {
-                let Some(stem) = input.file_stem() else { bail!("{}: is no file name", input.display()) };
-                let mut name = stem.to_owned();
-                name.push(".");
-                name.push(extension);
-                Ok(folder.join(name))
-            };
-            let files = inputs.iter().map(file).collect::<Result<Vec<_>>>()?;
-            if !folder.exists() {
-                // nothing to overwrite: only names can clash
-                check_distinct(&files)?;
-                std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-            }
-            files.iter().try_for_each(|f| refuse_existing(f, overwrite))?;
-            files
-        }
+        (None, Some(folder)) => inputs.iter().map(|i| named(folder, i, extension)).collect::<Result<_>>()?,
     };
-    check(&outputs, &[extension], overwrite)?;
-    Ok(outputs)
+    check_distinct(&names)?;
+    let own = shard.own(&names);
+    if let Some(folder) = folder {
+        own.iter().try_for_each(|f| refuse_existing(f, overwrite))?;
+        create_folder(folder)?;
+    }
+    check(&own, &[extension], overwrite)?;
+    Ok(names)
+}
+
+/// Creates a folder for results unless it is there; several processes may do so at once.
+pub(crate) fn create_folder(folder: &Path) -> Result<()> {
+    if !folder.exists() {
+        std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+    }
+    Ok(())
+}
+
+/// The file in `folder` that is called like `input`, with another extension.
+pub(crate) fn named(folder: &Path, input: &Path, extension: &str) -> Result<PathBuf> {
+    let Some(stem) = input.file_stem() else { bail!("{}: is no file name", input.display()) };
+    let mut name = stem.to_owned();
+    name.push(".");
+    name.push(extension);
+    Ok(folder.join(name))
 }
 
 /// The folder that holds `path`.
@@ -90,8 +106,9 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 
 /// Refuses two outputs of one name.
 pub(crate) fn check_distinct(paths: &[PathBuf]) -> Result<()> {
-    match paths.iter().enumerate().find(|(at, path)| paths[..*at].contains(path)) {
-        Some((_, path)) => bail!("{}: would be written twice; leave one out or rename it", path.display()),
+    let mut known = HashSet::new();
+    match paths.iter().find(|path| !known.insert(*path)) {
+        Some(path) => bail!("{}: would be written twice; leave one out or rename it", path.display()),
         None => Ok(()),
     }
 }
@@ -108,7 +125,7 @@ pub(crate) fn writable(folder: &Path, wanted: &Path) -> Result<()> {
         }
         Ok(_) => {}
     }
-    let probe = folder.join(format!(".veni-cli-{}.probe", std::process::id()));
+    let probe = folder.join(format!(".veni-cli-{:016x}.probe", process_token()));
     match OpenOptions::new().write(true).create_new(true).open(&probe) {
         Ok(_) => {
             // an empty file that stays behind is not worth failing for

@@ -40,7 +40,8 @@ fn embedded() -> Result<Model> {
     bail!("this build has no model inside: name a model file with --model FILE")
 }
 
-fn model_file(path: &Path) -> Result<PathBuf> {
+/// The file that a model, or the folder of a training run, names.
+pub(crate) fn model_file(path: &Path) -> Result<PathBuf> {
     if !path.is_dir() {
         return Ok(path.to_owned());
     }

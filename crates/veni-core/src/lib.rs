@@ -29,6 +29,8 @@ pub mod fit;
 #[cfg(feature = "learn")]
 pub mod nn;
 #[cfg(feature = "learn")]
+mod parallel;
+#[cfg(feature = "learn")]
 pub mod train;
 #[cfg(feature = "learn")]
 pub mod vae;

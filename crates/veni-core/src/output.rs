@@ -54,6 +54,20 @@ pub fn refuse_existing(path: &Path, overwrite: Overwrite) -> Result<()> {
     Ok(())
 }
 
+/// Whether this is the unfinished file of a [`write_atomic`], by its name.
+pub fn is_part(path: &Path) -> bool {
+    let hidden = path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
+    hidden && path.extension().is_some_and(|e| e == "part")
+}
+
+/// A number that no other process is likely to have: process numbers repeat from machine to machine, and several may
+/// write to one file system.
+pub fn process_token() -> u64 {
+    use std::hash::{BuildHasher, RandomState};
+    static TOKEN: std::sync::OnceLock<u64> = std::sync::OnceLock::new();
+    *TOKEN.get_or_init(|| RandomState::new().hash_one(std::process::id()))
+}
+
 fn beside(path: &Path) -> Result<PathBuf> {
     use std::sync::atomic::{AtomicU64, Ordering};
     static COUNT: AtomicU64 = AtomicU64::new(0);
@@ -62,6 +76,6 @@ fn beside(path: &Path) -> Result<PathBuf> {
         .ok_or_else(|| Error::invalid(format!("{}: is no file name to write to", path.display())))?;
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(name);
-    hidden.push(format!(".{}-{}.part", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
+    hidden.push(format!(".{:016x}-{}.part", process_token(), COUNT.fetch_add(1, Ordering::Relaxed)));
     Ok(path.with_file_name(hidden))
 }

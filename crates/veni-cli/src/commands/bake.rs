@@ -1,4 +1,4 @@
-//! `veni-cli bake`: a latent to image files.
+//! `veni-cli bake`: latents to image files.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -16,9 +16,10 @@ use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::picture::{Picture, preview_tonemap};
 use crate::progress::Progress;
-use crate::report::{Outcome, Report};
+use crate::report::{self, Outcome, Report};
 use crate::size::Size;
-use crate::source;
+use crate::skies::{self, Job, Many, Sky, Target};
+use crate::source::{self, Loaded};
 
 /// The largest finite half-precision number.
 const HALF_MAX: f32 = 65504.0;
@@ -37,6 +38,7 @@ const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
         The sky is a latent: a latent file (JSON), an image that this program baked (its latent is inside), an HDR \
         panorama (encoded on the fly), or a random one named by --seed. The same seed and model give the same sky \
         for ever.\n\n\
+        Several skies, or --count random ones, go to --out-dir, each named after its file or seed.\n\n\
         Formats by extension: .exr (linear, half or float), .hdr (Radiance RGBE), .png (tonemapped preview). An \
         EXR or HDR file carries its latent and the model's hash, so that it can be baked again at any size.",
     after_help = "Cube maps: six square faces stacked from top to bottom in the order +X -X +Y -Y +Z -Z of --frame, \
@@ -52,20 +54,21 @@ const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
         veni-cli bake sky.exr -o turned.exr --turn 90 --exposure -1\n  \
         veni-cli bake photo.hdr -o relit.exr                   through the encoder\n  \
         veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512\n  \
+        veni-cli bake latents/*.json --out-dir skies --format exr,png\n  \
+        veni-cli bake --seed 0 --count 1000 --out-dir skies --shard 2/4    the second of four processes\n  \
         veni-cli bake --seed 7 -o sky.exr --device cpu         the same bits whatever card there is"
 )]
 pub(crate) struct Bake {
-    /// Latent file, baked image, or HDR panorama
-    #[arg(group = "sky")]
-    latent: Option<PathBuf>,
+    /// Latent files, baked images, or HDR panoramas
+    #[arg(group = "sky", value_name = "LATENT")]
+    latents: Vec<PathBuf>,
 
     /// A random sky from the model's prior, named by a number
     #[arg(long, short, value_name = "S", group = "sky")]
     seed: Option<u64>,
 
-    /// File to write (.exr, .hdr or .png); may be given several times
-    #[arg(long, short, required = true, value_name = "OUT")]
-    output: Vec<PathBuf>,
+    #[command(flatten)]
+    target: Target,
 
     /// Width, or width x height; of one face for cube maps [default: 1024x512, faces of 256]
     #[arg(long, value_name = "W|WxH")]
@@ -106,6 +109,9 @@ pub(crate) struct Bake {
 
     #[command(flatten)]
     force: Force,
+
+    #[command(flatten)]
+    many: Many,
 }
 
 /// How directions are laid out in the image.
@@ -134,24 +140,43 @@ pub(crate) enum FrameName {
 impl Bake {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
         let overwrite = Overwrite::from(self.force);
-        output::check(&self.output, &["exr", "hdr", "png"], overwrite)?;
+        let jobs = skies::jobs(&self.latents, self.seed, &self.target, &self.many, overwrite, report)?;
         let picture = Picture::new(self.layout, self.frame, self.size)?;
         let loaded = source::model(&self.model)?;
-        let model = &loaded.model;
-        model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
-        let device = Device::open(self.device, model, report)?;
-        let named = match (&self.latent, self.seed) {
-            (Some(path), _) => source::from_file(path, &loaded, report)?,
-            (None, Some(seed)) => source::seeded(model, seed),
-            (None, None) => bail!("name a latent or give --seed"),
+        loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
+        let device = Device::open(self.device, &loaded.model, report)?;
+        let mut failed = Vec::new();
+        for job in jobs {
+            match self.one(&job, &picture, &loaded, &device, report) {
+                Ok(()) => {}
+                Err(error) if report::is_closed_pipe(&error) => return Err(error),
+                Err(error) => failed.push(error),
+            }
+        }
+        report::last_of(failed)
+    }
+
+    /// One sky to its files.
+    fn one(
+        &self,
+        job: &Job,
+        picture: &Picture,
+        loaded: &Loaded,
+        device: &Device,
+        report: Report,
+    ) -> Result<()> {
+        let overwrite = Overwrite::from(self.force);
+        let named = match &job.sky {
+            Sky::File(path) => source::from_file(path, loaded, report)?,
+            Sky::Seed(seed) => source::seeded(&loaded.model, *seed),
         };
         let latent = self.changed(&named);
         let started = Instant::now();
         let baker = device.condition(&latent)?;
-        let png = self.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")));
+        let png = job.files.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")));
         // the exposure of a preview is that of the sky before --exposure, which would otherwise be undone
         let tonemap = if png { preview_tonemap(&device.condition(&named)?)? } else { NEUTRAL };
-        let attributes = picture.attributes(&latent, &model.hash())?;
+        let attributes = picture.attributes(&latent, &loaded.model.hash())?;
         let files = |precision| -> veni_core::Result<Vec<_>> {
             let file = |path: &PathBuf| {
                 let mut format = WriteFormat::of(path, tonemap)?;
@@ -165,7 +190,7 @@ impl Bake {
                     WriteOptions { attributes, overwrite, latlong, ..WriteOptions::new(format) },
                 ))
             };
-            self.output.iter().map(file).collect()
+            job.files.iter().map(file).collect()
         };
         let (mut precision, may_change) = match (self.half, self.float) {
             (true, _) => (Precision::Half, false),
@@ -205,8 +230,7 @@ impl Bake {
                 (Ok(()), None) => break,
             }
         }
-        self.report(&picture, &latent, precision, device.name(), started, report)?;
-        Ok(Outcome::Fine)
+        self.report(&job.files, picture, &latent, precision, device.name(), started, report)
     }
 
     /// The latent with `--turn` and `--exposure` in it: what the files record.
@@ -217,8 +241,10 @@ impl Bake {
         latent
     }
 
+    #[allow(clippy::too_many_arguments, reason = "all that is said of a file")]
     fn report(
         &self,
+        files: &[PathBuf],
         picture: &Picture,
         latent: &Latent,
         precision: Precision,
@@ -229,7 +255,7 @@ impl Bake {
         let seconds = started.elapsed().as_secs_f64();
         let precision = if precision == Precision::Half { "half" } else { "float" };
         let from = latent.source.as_deref().unwrap_or("unknown source");
-        let files: Vec<_> = self.output.iter().map(|p| p.display().to_string()).collect();
+        let files: Vec<_> = files.iter().map(|p| p.display().to_string()).collect();
         let human = format!(
             "{}: {}, {from} ({seconds:.2} s on {device})",
             files.join(", "),

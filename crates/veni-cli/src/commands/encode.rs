@@ -20,6 +20,7 @@ use crate::args::{Force, ModelArgs};
 use crate::output::{self, with_remedy};
 use crate::progress::Progress;
 use crate::report::{self, Outcome, Report, to_stdout};
+use crate::shard::Shard;
 use crate::sheet::Sheet;
 use crate::source::{self, Loaded};
 
@@ -40,6 +41,7 @@ const PREVIEW: [usize; 2] = [256, 128];
         veni-cli encode sky.exr -o sky.json\n  \
         veni-cli encode sky.exr > sky.json\n  \
         veni-cli encode *.hdr --out-dir latents --preview pairs.png\n  \
+        veni-cli encode *.hdr --out-dir latents --shard 2/4     the second of four processes\n  \
         veni-cli encode sky.exr -o sky.json && veni-cli bake sky.json -o again.exr"
 )]
 pub(crate) struct Encode {
@@ -64,6 +66,9 @@ pub(crate) struct Encode {
 
     #[command(flatten)]
     force: Force,
+
+    #[command(flatten)]
+    shard: Shard,
 }
 
 /// A panorama's latent and how good it is.
@@ -127,9 +132,11 @@ impl Encode {
         let encoding = Encoding::new(&loaded)?;
         let mut sheet =
             self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
-        let mut progress = Progress::start(report, "panorama", 0, self.panoramas.len() as u64);
+        self.shard.note_idle(self.panoramas.len(), report);
+        let own: Vec<_> = self.panoramas.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)).collect();
+        let mut progress = Progress::start(report, "panorama", 0, own.len() as u64);
         let mut failed = Vec::new();
-        for (at, path) in self.panoramas.iter().enumerate() {
+        for (done, (at, path)) in (1..).zip(own) {
             let encode = || -> Result<Encoded> {
                 let encoded = encoding.encode_file(path, report)?;
                 if let Some(output) = outputs.get(at) {
@@ -146,7 +153,7 @@ impl Encode {
                 }
                 Err(error) => failed.push(error),
             }
-            progress.set(at as u64 + 1, String::new);
+            progress.set(done, String::new);
         }
         progress.finish();
         if let Some((sheet, path)) = sheet.zip(self.preview.as_ref())
@@ -159,10 +166,12 @@ impl Encode {
 
     /// One latent file per panorama, checked; none if the latents go to stdout.
     fn outputs(&self, overwrite: Overwrite) -> Result<Vec<PathBuf>> {
+        self.shard.refuse("--preview", self.preview.is_some())?;
         if let Some(preview) = &self.preview {
             output::check(std::slice::from_ref(preview), &["png"], overwrite)?;
         }
-        output::one_per_input(&self.panoramas, self.output.as_ref(), self.out_dir.as_ref(), "json", overwrite)
+        let (output, folder) = (self.output.as_ref(), self.out_dir.as_ref());
+        output::one_per_input(&self.panoramas, output, folder, "json", overwrite, self.shard)
     }
 }
 

@@ -7,11 +7,12 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use serde_json::json;
 use veni_core::eval::codec::Codec;
 use veni_core::eval::lpips::{self, Lpips};
 use veni_core::eval::protocol::paper::{self, Published};
 use veni_core::eval::protocol::{
-    Evaluation, Report as Findings, Settings, ablations, consistency, dataset_size, equivariance,
+    Evaluation, Report as Findings, Settings, Share, ablations, consistency, dataset_size, equivariance,
     interpolation, inverse_rendering, reconstruction, uniqueness,
 };
 use veni_core::eval::store::Store;
@@ -21,8 +22,10 @@ use veni_core::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
 use veni_core::{Error, data::Dataset};
 
+use crate::loading::Loading;
 use crate::output::with_remedy;
 use crate::report::{Outcome, Report, to_stdout};
+use crate::shard::Shard;
 use crate::size::Size;
 use watch::Bars;
 
@@ -38,6 +41,8 @@ const MIN_HEIGHT: usize = 8;
         goes on; run it with other models, panoramas or settings and only what is new is computed.\n\n\
         DIR holds equirectangular OpenEXR or Radiance files; of a folder with train/ and val/ inside, val/ is taken. \
         Every definition is in docs/MODEL.md, Evaluation.\n\n\
+        --shard I/N computes a share of what is kept, and makes no tables; once all shares are there, the same command \
+        without it finds them. They may run at once, on machines with one file system.\n\n\
         LPIPS needs weights, which do not come with this program: name a safetensors file or what torch.save wrote, \
         with AlexNet's features (torchvision's alexnet-owt-….pth, 'features.N.weight') and the five heads (the lpips \
         package's weights/v0.1/alex.pth, 'linL.model.1.weight'), in one file or in two; a checkpoint of the authors' \
@@ -46,6 +51,7 @@ const MIN_HEIGHT: usize = 8;
         veni-cli evaluate reconstruction --data hdri --out eval\n  \
         veni-cli evaluate reconstruction --model ours=runs/a base=runs/b --data hdri --out eval --quick\n  \
         veni-cli evaluate uniqueness --model runs/a --data hdri --images 20 --out eval --table csv\n  \
+        veni-cli evaluate uniqueness --model runs/a --data hdri --out eval --shard 2/4     the second of four\n  \
         veni-cli evaluate paper --model veni=runs/a reni=runs/r --data hdri --out eval --lpips alexnet.pth alex.pth"
 )]
 pub(crate) struct Evaluate {
@@ -105,6 +111,9 @@ pub(crate) struct Evaluate {
     /// Numbers of the article to stand beside ours (paper): JSON {table: {row: {column: number}}}
     #[arg(long, value_name = "FILE")]
     published: Option<PathBuf>,
+
+    #[command(flatten)]
+    shard: Shard,
 }
 
 /// The experiments.
@@ -171,6 +180,11 @@ impl Evaluate {
         if self.published.is_some() && self.protocol != Protocol::Paper {
             bail!("--published: only 'evaluate paper' shows published numbers; leave it out");
         }
+        if self.shard.is_part() && self.protocol == Protocol::Equivariance {
+            bail!(
+                "--shard: equivariance keeps nothing that could be shared out; run it once, without --shard"
+            );
+        }
         let published = self.published.as_deref().map(Published::load).transpose()?.unwrap_or_default();
         let files = inputs::panoramas(&self.data, self.images)?;
         inputs::check_folder(&self.out)?;
@@ -178,7 +192,10 @@ impl Evaluate {
         let subjects = inputs::subjects(&self.models, device)?;
         let lpips =
             if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
-        let data = Dataset::load(&files, grid)?;
+        let loading = Loading::new(report);
+        let data = Dataset::load_heard(&files, grid, &|done, all| loading.set(done, all));
+        loading.finish();
+        let data = data?;
         inputs::create_folder(&self.out)?;
         let (store, figures, bars) = (Store::new(&self.out), self.out.join("figures"), Bars::new(report));
         let settings =
@@ -195,6 +212,17 @@ impl Evaluate {
             figures: &figures,
             watch: &bars,
         };
+        if self.shard.is_part() {
+            let (at, of) = self.shard.place();
+            let kept = self.protocol.keep(&evaluation, Share { at, of }).map_err(with_remedy);
+            bars.finish();
+            kept?;
+            let (out, shard) = (self.out.display(), self.shard);
+            let human =
+                format!("{out}: share {shard} is kept; once all are, run without --shard for the tables");
+            report.result(human, &json!({ "out": out.to_string(), "shard": shard.to_string() }))?;
+            return Ok(Outcome::Fine);
+        }
         let found = self.protocol.run(&evaluation, &published).map_err(with_remedy);
         bars.finish();
         self.show(&found?, report)?;
@@ -256,6 +284,21 @@ impl Protocol {
             Self::Ablations => ablations::run(evaluation),
             Self::InverseRendering => inverse_rendering::run(evaluation),
             Self::Paper => paper::run(evaluation, published),
+        }
+    }
+
+    /// A share of what takes long.
+    fn keep(self, evaluation: &Evaluation<'_>, share: Share) -> veni_core::Result<()> {
+        match self {
+            Self::Reconstruction => reconstruction::keep(evaluation, share),
+            Self::Uniqueness => uniqueness::keep(evaluation, share),
+            Self::Consistency => consistency::keep(evaluation, share),
+            Self::Interpolation => interpolation::keep(evaluation, share),
+            Self::Equivariance => Ok(()),
+            Self::DatasetSize => dataset_size::keep(evaluation, share),
+            Self::Ablations => ablations::keep(evaluation, share),
+            Self::InverseRendering => inverse_rendering::keep(evaluation, share),
+            Self::Paper => paper::keep(evaluation, share),
         }
     }
 }

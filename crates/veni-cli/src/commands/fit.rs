@@ -23,6 +23,7 @@ use crate::args::{Force, ModelArgs};
 use crate::output::{self, with_remedy};
 use crate::progress::Progress;
 use crate::report::{self, Outcome, Report, to_stdout};
+use crate::shard::Shard;
 use crate::size::Size;
 use crate::source;
 
@@ -46,6 +47,7 @@ use shaded::Shaded;
     after_help = "Without -o and --out-dir the latent itself goes to stdout, one line of JSON per picture.\n\n\
         Examples:\n  \
         veni-cli fit sky.exr -o sky.json\n  \
+        veni-cli fit *.exr --out-dir latents --shard 2/4     the second of four processes\n  \
         veni-cli fit half.exr --mask known.png -o sky.json --completed whole.exr --uncertainty doubt.png\n  \
         veni-cli fit photo.jpg --fov 65 --look 90,10 -o sky.json --completed whole.exr\n  \
         veni-cli fit ball.exr --normals n.exr --mask m.png --ks 0.2 -o light.json --completed light.exr\n  \
@@ -88,6 +90,9 @@ pub(crate) struct Fit {
 
     #[command(flatten)]
     force: Force,
+
+    #[command(flatten)]
+    shard: Shard,
 }
 
 /// One picture's fit.
@@ -105,8 +110,9 @@ impl Fit {
         let overwrite = Overwrite::from(self.force);
         let pictures = &self.input.pictures;
         self.check_images(overwrite)?;
-        let outputs =
-            output::one_per_input(pictures, self.output.as_ref(), self.out_dir.as_ref(), "json", overwrite)?;
+        let (output, folder) = (self.output.as_ref(), self.out_dir.as_ref());
+        let outputs = output::one_per_input(pictures, output, folder, "json", overwrite, self.shard)?;
+        self.shard.note_idle(pictures.len(), report);
         self.settings.grid(false)?;
         let config = self.settings.config()?;
         let loaded = source::model(&self.model)?;
@@ -114,7 +120,7 @@ impl Fit {
         let subject =
             Subject::new(&loaded.name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?;
         let mut failed = Vec::new();
-        for (at, path) in pictures.iter().enumerate() {
+        for (at, path) in pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)) {
             match self.one(path, outputs.get(at), &subject, &config, report) {
                 Ok(()) => {}
                 Err(error) if report::is_closed_pipe(&error) => return Err(error),
@@ -131,6 +137,7 @@ impl Fit {
         }
         let images = [(&self.completed, "--completed"), (&self.uncertainty, "--uncertainty")];
         for (path, option) in images {
+            self.shard.refuse(option, path.is_some())?;
             if path.is_some() && self.input.pictures.len() > 1 {
                 bail!(
                     "{option} names one file for {} pictures: fit them one by one",

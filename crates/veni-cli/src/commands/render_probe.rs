@@ -18,8 +18,9 @@ use veni_core::sphere::Equirect;
 
 use crate::args::{Force, ModelArgs};
 use crate::output::{self, CAMERA, MATERIAL, with_remedy};
-use crate::report::{Outcome, Report};
+use crate::report::{self, Outcome, Report};
 use crate::size::Size;
+use crate::skies::{self, Job, Many, Sky, Target};
 use shape::Up;
 
 /// Largest image, pixels, for which about 150 bytes each are needed.
@@ -51,20 +52,20 @@ const PLAIN: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
         veni-cli render-probe sky.exr -o ball.exr -o ball.png          a white sphere\n  \
         veni-cli render-probe --seed 7 -o ball.png --ks 0.5 --shininess 100\n  \
         veni-cli render-probe sky.hdr -o bunny.exr --mesh bunny.obj --azimuth 30 --elevation 20\n  \
+        veni-cli render-probe skies/*.exr --out-dir balls --format exr,png\n  \
         veni-cli render-probe sky.exr -o ball.exr --size 64 --normals n.exr --mask m.png"
 )]
 pub(crate) struct RenderProbe {
-    /// HDR panorama, or latent file
+    /// HDR panoramas, or latent files
     #[arg(group = "light", value_name = "PANORAMA|LATENT")]
-    source: Option<PathBuf>,
+    sources: Vec<PathBuf>,
 
     /// A random sky from the model's prior, named by a number
     #[arg(long, short, value_name = "S", group = "light")]
     seed: Option<u64>,
 
-    /// Image to write (.exr in single precision, .hdr or .png); may be given several times
-    #[arg(long, short, required = true, value_name = "OUT")]
-    output: Vec<PathBuf>,
+    #[command(flatten)]
+    target: Target,
 
     /// Also write the normals
     #[arg(long, value_name = "OUT.exr")]
@@ -127,30 +128,54 @@ pub(crate) struct RenderProbe {
 
     #[command(flatten)]
     force: Force,
+
+    #[command(flatten)]
+    many: Many,
 }
 
 impl RenderProbe {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
         let overwrite = Overwrite::from(self.force);
-        let [width, height] = self.check(overwrite)?;
-        let started = Instant::now();
+        let jobs = skies::jobs(&self.sources, self.seed, &self.target, &self.many, overwrite, report)?;
+        let size = self.check(&jobs, overwrite)?;
         let angles = [self.azimuth.to_radians(), self.elevation.to_radians()];
         let (surface, camera) = match &self.mesh {
-            Some(path) => shape::mesh(path, self.up, angles, [width, height], report)?,
-            None => shape::sphere(angles, [width, height])?,
+            Some(path) => shape::mesh(path, self.up, angles, size, report)?,
+            None => shape::sphere(angles, size)?,
         };
         let grid = Equirect::new(self.lights, self.lights / 2);
-        let light = match (&self.source, self.seed) {
-            (Some(path), _) => light::from_file(path, &self.model, grid, self.turn.to_radians(), report)?,
-            (None, Some(seed)) => light::seeded(seed, &self.model, grid, self.turn.to_radians())?,
-            (None, None) => bail!("name a panorama or a latent, or give --seed"),
+        let transfer = self.transfer(&surface, grid)?;
+        let scene = Scene { surface, camera, grid, transfer };
+        let mut failed = Vec::new();
+        for (at, job) in jobs.iter().enumerate() {
+            match self.one(job, &scene, at == 0, report) {
+                Ok(()) => {}
+                Err(error) if report::is_closed_pipe(&error) => return Err(error),
+                Err(error) => failed.push(error),
+            }
+        }
+        report::last_of(failed)
+    }
+
+    /// One light; with the `first` also what is the same under all of them.
+    fn one(&self, job: &Job, scene: &Scene, first: bool, report: Report) -> Result<()> {
+        let started = Instant::now();
+        let (turn, grid) = (self.turn.to_radians(), scene.grid);
+        let light = match &job.sky {
+            Sky::File(path) => light::from_file(path, &self.model, grid, turn, report)?,
+            Sky::Seed(seed) => light::seeded(*seed, &self.model, grid, turn)?,
         };
         let factor = self.exposure.exp2() as f32;
         let radiance: Vec<_> = light.iter().map(|p| p.map(|v| v * factor)).collect();
-        let transfer = self.transfer(&surface, grid)?;
-        let image = transfer.render(&radiance);
-        let files = self.write(&surface, &camera, image, factor, overwrite)?;
+        let image = scene.transfer.render(&radiance);
+        let mut files = self.write(&job.files, scene, image, factor)?;
+        // every shard has a first light, but only one the very first
+        if first && self.many.shard.pick(0) {
+            files.extend(self.write_shape(scene)?);
+        }
         let seconds = started.elapsed().as_secs_f64();
+        let Scene { surface, camera, .. } = scene;
+        let (width, height) = (surface.width(), surface.height());
         let (pixels, lights) = (surface.pixels(), grid.len());
         let human = format!(
             "{}: {width} x {height}, {pixels} pixels of surface under {lights} lights ({seconds:.2} s)",
@@ -166,16 +191,17 @@ impl RenderProbe {
             "material": self.material_json(),
             "seconds": seconds,
         });
-        report.result(human, &value)?;
-        Ok(Outcome::Fine)
+        report.result(human, &value)
     }
 
     /// All that can be refused before any work; the size of the image.
-    fn check(&self, overwrite: Overwrite) -> Result<[usize; 2]> {
-        output::check(&self.output, &["exr", "hdr", "png"], overwrite)?;
-        output::check(self.normals.as_slice(), &["exr"], overwrite)?;
-        output::check(self.mask.as_slice(), &["png"], overwrite)?;
-        let all: Vec<_> = self.output.iter().chain(&self.normals).chain(&self.mask).cloned().collect();
+    fn check(&self, jobs: &[Job], overwrite: Overwrite) -> Result<[usize; 2]> {
+        if self.many.shard.pick(0) {
+            output::check(self.normals.as_slice(), &["exr"], overwrite)?;
+            output::check(self.mask.as_slice(), &["png"], overwrite)?;
+        }
+        let images = jobs.iter().flat_map(|job| &job.files);
+        let all: Vec<_> = images.chain(&self.normals).chain(&self.mask).cloned().collect();
         output::check_distinct(&all)?;
         let (width, height) = self.size.image();
         if width * height > MAX_PIXELS {
@@ -184,7 +210,7 @@ impl RenderProbe {
         Ok([width, height])
     }
 
-    /// The matrix is used once, so it is not kept.
+    /// Rows are computed as they are used: most often there is one light.
     fn transfer(&self, surface: &Surface, grid: Equirect) -> Result<Transfer> {
         let albedo = Colour::Uniform(self.albedo);
         let material = if self.ks > 0.0 {
@@ -199,39 +225,67 @@ impl RenderProbe {
         json!({ "albedo": self.albedo, "ks": self.ks, "shininess": self.shininess })
     }
 
-    /// Writes everything; the names of the files.
+    /// Writes what the light makes of the surface; the names of the files.
     fn write(
         &self,
-        surface: &Surface,
-        camera: &Camera,
+        files: &[PathBuf],
+        scene: &Scene,
         image: Vec<[f32; 3]>,
         factor: f32,
-        overwrite: Overwrite,
     ) -> Result<Vec<String>> {
-        let size = Equirect::new(surface.width(), surface.height());
-        let camera = (CAMERA.to_owned(), camera.to_json());
         let material = (MATERIAL.to_owned(), self.material_json().to_string());
-        let write = |path: &Path, pixels: Vec<[f32; 3]>, tonemap, attributes: BTreeMap<_, _>| {
-            let mut format = WriteFormat::of(path, tonemap)?;
-            if let WriteFormat::Exr(precision) = &mut format {
-                *precision = Precision::Float;
-            }
-            let options = WriteOptions { attributes, overwrite, latlong: false, ..WriteOptions::new(format) };
-            Panorama::new(size, pixels).write(path, &options).map_err(with_remedy)
-        };
-        let preview = preview(surface, &image, factor);
-        for path in &self.output {
-            write(path, image.clone(), preview, BTreeMap::from([camera.clone(), material.clone()]))?;
+        let attributes = BTreeMap::from([scene.attribute(), material]);
+        let tonemap = preview(&scene.surface, &image, factor);
+        for path in files {
+            self.write_one(path, scene, image.clone(), tonemap, attributes.clone())?;
         }
+        Ok(files.iter().map(|p| p.display().to_string()).collect())
+    }
+
+    /// Normals and mask, as far as they are wanted; the names of the files.
+    fn write_shape(&self, scene: &Scene) -> Result<Vec<String>> {
         if let Some(path) = &self.normals {
-            write(path, surface.normals().to_vec(), PLAIN, BTreeMap::from([camera]))?;
+            let normals = scene.surface.normals().to_vec();
+            self.write_one(path, scene, normals, PLAIN, BTreeMap::from([scene.attribute()]))?;
         }
         if let Some(path) = &self.mask {
-            let mask = surface.valid().iter().map(|v| [if *v { 1.0 } else { 0.0 }; 3]).collect();
-            write(path, mask, PLAIN, BTreeMap::new())?;
+            let mask = scene.surface.valid().iter().map(|v| [if *v { 1.0 } else { 0.0 }; 3]).collect();
+            self.write_one(path, scene, mask, PLAIN, BTreeMap::new())?;
         }
-        let files = self.output.iter().chain(&self.normals).chain(&self.mask);
-        Ok(files.map(|p| p.display().to_string()).collect())
+        Ok(self.normals.iter().chain(&self.mask).map(|p| p.display().to_string()).collect())
+    }
+
+    fn write_one(
+        &self,
+        path: &Path,
+        scene: &Scene,
+        pixels: Vec<[f32; 3]>,
+        tonemap: Tonemap,
+        attributes: BTreeMap<String, String>,
+    ) -> Result<()> {
+        let mut format = WriteFormat::of(path, tonemap)?;
+        if let WriteFormat::Exr(precision) = &mut format {
+            *precision = Precision::Float;
+        }
+        let overwrite = Overwrite::from(self.force);
+        let options = WriteOptions { attributes, overwrite, latlong: false, ..WriteOptions::new(format) };
+        let size = Equirect::new(scene.surface.width(), scene.surface.height());
+        Panorama::new(size, pixels).write(path, &options).map_err(with_remedy)
+    }
+}
+
+/// What is the same under every light.
+struct Scene {
+    surface: Surface,
+    camera: Camera,
+    /// The lights.
+    grid: Equirect,
+    transfer: Transfer,
+}
+
+impl Scene {
+    fn attribute(&self) -> (String, String) {
+        (CAMERA.to_owned(), self.camera.to_json())
     }
 }
 

@@ -1,6 +1,7 @@
 //! `veni-cli train`: a model from a folder of panoramas.
 
 mod config;
+mod folder;
 mod watch;
 
 use std::path::{Path, PathBuf};
@@ -11,21 +12,18 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use veni_core::Error;
-use veni_core::data::Splits;
+use veni_core::model::ModelKind;
 use veni_core::train::config::DeviceKind;
+use veni_core::train::init::Initialised;
 use veni_core::train::presets::Preset;
 use veni_core::train::run::{Finish, Trainer};
 
 use crate::commands::inspect::run::{self, Best};
-use crate::output::{folder_of, with_remedy, writable};
+use crate::loading::Loading;
+use crate::output::with_remedy;
 use crate::progress::duration;
 use crate::report::{Outcome, Report, to_stderr};
 use watch::Watch;
-
-/// What a run writes into its folder.
-const FILES: [&str; 4] = ["config.toml", "metrics.jsonl", "model.safetensors", "latents.safetensors"];
-const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
 
 /// Train a model on HDR panoramas
 #[derive(Args, Debug)]
@@ -36,6 +34,9 @@ const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
         that defines the run), metrics.jsonl (one line per step and validation), preview/*.png (target | \
         reconstruction | random sample), checkpoint/ and model.safetensors, the weights that validated best; with \
         --system reni++ also latents.safetensors, the latents of the training panoramas.\n\n\
+        --pretrain makes a run of two stages; config.toml may describe others ([[stage]], see docs/MODEL.md): each has \
+        updates, panoramas, learning rates, losses and augmentation of its own, and all are validated on the \
+        panoramas of --data.\n\n\
         Ctrl-C writes a checkpoint and ends; a second one ends at once. A run that was stopped or killed continues \
         with --resume from its last checkpoint as if nothing had happened, to the bit on the same machine.",
     after_help = "Examples:\n  \
@@ -43,6 +44,8 @@ const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
         veni-cli train --data hdri --preset small --latent-vectors 9 --seed 1 --out runs/small\n  \
         veni-cli train --data hdri --system reni++ --preset small --out runs/reni\n  \
         veni-cli train --resume --out runs/small\n  \
+        veni-cli train --data hdri --pretrain skies ldr --pretrain-steps 20000 --out runs/two\n  \
+        veni-cli train --data indoor --init runs/small --steps 3000 --out runs/indoor\n  \
         veni-cli train --data hdri --out runs/kld --set loss.kld=0.001 --set batch=8\n  \
         veni-cli train --config runs/small/config.toml --seed 2 --out runs/second"
 )]
@@ -54,6 +57,20 @@ pub(crate) struct Train {
     /// Folder of the run
     #[arg(long, short, value_name = "RUN")]
     out: PathBuf,
+
+    /// Begin with the weights of this model (or run) instead of random ones; a model without encoder, or --system
+    /// reni++, takes the decoder alone
+    #[arg(long, value_name = "MODEL")]
+    init: Option<PathBuf>,
+
+    /// Train on other panoramas first (synthetic skies, expanded photographs), then on those of --data with a tenth of
+    /// the learning rates
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "config")]
+    pretrain: Vec<PathBuf>,
+
+    /// Number of updates on the panoramas of --pretrain [default: as many as follow]
+    #[arg(long, value_name = "N", requires = "pretrain", value_parser = clap::value_parser!(u64).range(1..))]
+    pretrain_steps: Option<u64>,
 
     /// What is trained [default: veni]
     #[arg(long, value_enum, conflicts_with = "config")]
@@ -154,7 +171,19 @@ impl Train {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
         crate::allocator::keep_memory();
         let started = Instant::now();
-        let mut trainer = if self.resume { self.continued()? } else { self.begun()? };
+        let mut trainer = if self.resume { self.continued(report)? } else { self.begun(report)? };
+        if trainer.initialised() == Some(Initialised::Decoder) {
+            let model = trainer.config().init.as_ref().map(|init| init.model.display().to_string());
+            report.note(format_args!(
+                "{}: only its decoder is taken; {}",
+                model.unwrap_or_default(),
+                match trainer.config().model.kind {
+                    ModelKind::Veni => "it has no encoder, so that the run's starts from random weights",
+                    ModelKind::Reni =>
+                        "an auto-decoder has no encoder, and its latents start from random numbers",
+                }
+            ));
+        }
         let stop = stop_on_signal()?;
         let mut watch = Watch::new(report);
         let finish = trainer.run(&stop, &mut watch).map_err(with_remedy)?;
@@ -173,18 +202,24 @@ impl Train {
     }
 
     /// A new run.
-    fn begun(&self) -> Result<Trainer> {
+    fn begun(&self, report: Report) -> Result<Trainer> {
         let config = self.settings()?;
-        if self.check_folder()? {
-            // what is there goes only once the new data is known to be good
-            Splits::open(&config.data, config.seed)?;
+        let replace = self.check_folder()?;
+        let loading = Loading::new(report);
+        let trainer =
+            Trainer::prepare(&self.out, config, &self.command_line(), &|done, all| loading.set(done, all));
+        loading.finish();
+        let trainer = trainer.map_err(with_remedy)?;
+        if replace {
+            // what is there goes only now, when the new data is known to be good
             self.clear()?;
         }
-        Trainer::create(&self.out, config, &self.command_line()).map_err(with_remedy)
+        trainer.begin().map_err(with_remedy)?;
+        Ok(trainer)
     }
 
     /// A run that exists.
-    fn continued(&self) -> Result<Trainer> {
+    fn continued(&self, report: Report) -> Result<Trainer> {
         let stored = self.out.join("config.toml");
         if !stored.is_file() {
             bail!(
@@ -193,54 +228,11 @@ impl Train {
             );
         }
         self.check_same(&stored)?;
-        Ok(Trainer::resume(&self.out, &self.command_line())?)
-    }
-
-    /// Refuses a folder in use before the data is read. Whether there is a run to clear away (`--force`).
-    fn check_folder(&self) -> Result<bool> {
-        let out = &self.out;
-        if !out.exists() {
-            return writable(existing_above(out), out).map(|()| false);
-        }
-        if !out.is_dir() {
-            bail!("{}: is a file; name a folder for the run with --out", out.display());
-        }
-        writable(out, out)?;
-        let mut entries = std::fs::read_dir(out).map_err(|e| Error::io(out, "list", e))?.peekable();
-        if entries.peek().is_none() {
-            return Ok(false);
-        }
-        if !out.join("config.toml").is_file() {
-            bail!("{}: is not empty and no run either; name a new folder with --out", out.display());
-        }
-        if !self.force {
-            bail!(
-                "{}: holds a run already; --resume continues it, --force begins anew in its place",
-                out.display()
-            );
-        }
-        for entry in entries {
-            let name = entry.map_err(|e| Error::io(out, "list", e))?.file_name();
-            if !FILES.iter().chain(&FOLDERS).any(|known| name == *known) {
-                bail!(
-                    "{}: holds {} beside its run; name a new folder with --out",
-                    out.display(),
-                    name.display()
-                );
-            }
-        }
-        Ok(true)
-    }
-
-    /// Removes a run's files.
-    fn clear(&self) -> Result<()> {
-        for file in FILES {
-            remove(&self.out.join(file), |p| std::fs::remove_file(p))?;
-        }
-        for folder in FOLDERS {
-            remove(&self.out.join(folder), |p| std::fs::remove_dir_all(p))?;
-        }
-        Ok(())
+        let loading = Loading::new(report);
+        let trainer =
+            Trainer::resume_heard(&self.out, &self.command_line(), &|done, all| loading.set(done, all));
+        loading.finish();
+        Ok(trainer?)
     }
 
     fn report(
@@ -274,22 +266,6 @@ impl Train {
         });
         report.result(human, &value)
     }
-}
-
-/// The nearest folder above that exists.
-fn existing_above(path: &Path) -> &Path {
-    let mut folder = folder_of(path);
-    while !folder.exists() && folder != Path::new(".") {
-        folder = folder_of(folder);
-    }
-    folder
-}
-
-fn remove(path: &Path, how: impl Fn(&Path) -> std::io::Result<()>) -> Result<()> {
-    if path.exists() {
-        how(path).map_err(|e| Error::io(path, "remove", e))?;
-    }
-    Ok(())
 }
 
 /// Raised by the first Ctrl-C (or a request to terminate); the second one ends the process.

@@ -2,15 +2,20 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::data::exposure::centre_exposure;
 use crate::data::random::{Purpose, permutation, stream};
 use crate::panorama::Panorama;
+use crate::parallel::parallel;
 use crate::sphere::Equirect;
 use crate::{Error, Result};
+
+/// Hears how far reading has come: panoramas read, and panoramas in all. Several threads tell it.
+pub type Heard<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// Where panoramas come from and at which resolution they are used.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,11 +63,11 @@ impl Item {
     }
 }
 
-/// Panoramas of one grid.
+/// Panoramas of one grid. A clone shares them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     grid: Equirect,
-    items: Vec<Item>,
+    items: Arc<Vec<Item>>,
 }
 
 /// Training and validation panoramas.
@@ -91,16 +96,38 @@ impl Dataset {
                 grid.height
             );
         }
-        Self { grid, items }
+        Self { grid, items: Arc::new(items) }
     }
 
-    /// Reads, cleans and resamples files, in parallel; the order is kept.
+    /// Reads, cleans and resamples files, in parallel; the order is kept. As many files as there are processors are
+    /// in memory at their full size at a time.
     ///
     /// # Errors
     /// The first file (in order) that cannot be read, by name.
     pub fn load(files: &[PathBuf], grid: Equirect) -> Result<Self> {
-        let items = files.par_iter().map(|path| read_item(path, grid)).collect::<Vec<_>>();
-        Ok(Self { grid, items: items.into_iter().collect::<Result<_>>()? })
+        Self::load_heard(files, grid, &|_, _| {})
+    }
+
+    /// [`Dataset::load`], telling how far it has come.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn load_heard(files: &[PathBuf], grid: Equirect, heard: Heard<'_>) -> Result<Self> {
+        let done = AtomicUsize::new(0);
+        let items = parallel(files.len(), |at| {
+            let item = read_item(&files[at], grid)?;
+            heard(done.fetch_add(1, Ordering::Relaxed) + 1, files.len());
+            Ok(item)
+        })?;
+        Ok(Self::new(grid, items))
+    }
+
+    /// Only the panoramas that are wanted.
+    #[must_use]
+    pub fn retain(self, wanted: impl Fn(&Item) -> bool) -> Self {
+        let mut items = Arc::unwrap_or_clone(self.items);
+        items.retain(wanted);
+        Self { items: Arc::new(items), ..self }
     }
 
     /// The pixel grid of every item.
@@ -130,6 +157,14 @@ impl Splits {
     /// # Errors
     /// [`Error::Invalid`] without folders or without any training panorama; otherwise as [`Dataset::load`].
     pub fn open(config: &DataConfig, seed: u64) -> Result<Self> {
+        Self::open_heard(config, seed, &|_, _| {})
+    }
+
+    /// [`Splits::open`], telling how far it has come.
+    ///
+    /// # Errors
+    /// As [`Splits::open`].
+    pub fn open_heard(config: &DataConfig, seed: u64, heard: Heard<'_>) -> Result<Self> {
         if config.folders.is_empty() {
             return Err(Error::invalid("no data: name at least one folder of EXR or HDR panoramas"));
         }
@@ -166,7 +201,11 @@ impl Splits {
                 names.join(", ")
             )));
         }
-        Ok(Self { train: Dataset::load(&train, grid)?, val: Dataset::load(&val, grid)? })
+        let all = train.len() + val.len();
+        Ok(Self {
+            train: Dataset::load_heard(&train, grid, &|done, _| heard(done, all))?,
+            val: Dataset::load_heard(&val, grid, &|done, _| heard(train.len() + done, all))?,
+        })
     }
 }
 

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use burn::tensor::Device;
 
-use super::store::digest;
 use crate::field;
 use crate::fit::FitDecoder;
 use crate::latent::{Latent, Prior};
@@ -53,7 +52,7 @@ impl Subject {
         };
         Ok(Self {
             name: name.into(),
-            identity: identity(&model),
+            identity: model.digest(),
             model: Arc::new(model),
             decoder: Arc::new(decoder),
             device: device.clone(),
@@ -193,12 +192,4 @@ fn decoder_alone(model: &Model, device: &Device) -> Result<Decoder> {
     let weights =
         tensors.map(|(name, t)| (name.clone(), Weight { shape: t.shape.clone(), data: t.data.clone() }));
     weights::write(decoder, "decoder", &weights.collect())
-}
-
-/// Unlike [`Model::hash`] this sees the encoder and the prior too, at full precision.
-fn identity(model: &Model) -> String {
-    let config = serde_json::to_vec(model.config()).unwrap_or_default();
-    let tensors =
-        model.tensors().iter().flat_map(|(name, t)| [name.as_bytes(), &[0], bytemuck::cast_slice(&t.data)]);
-    digest(std::iter::once(config.as_slice()).chain(tensors))
 }

@@ -39,6 +39,10 @@ pub struct Training {
     pub command: String,
     /// Revision of this program.
     pub git: String,
+    /// The model that training began with, by file name and [`digest`](super::Model::digest); absent: weights from the
+    /// seed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub init: Option<String>,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -152,6 +152,20 @@ impl Model {
         sha.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
     }
 
+    /// Identity of all weights, encoder and prior included: the first 8 bytes of SHA-256, as 16 hexadecimal digits, over
+    /// the JSON of the configuration, then for every tensor in alphabetical order its name, a zero byte, and its
+    /// values as f32, little endian. Provenance does not enter.
+    pub fn digest(&self) -> String {
+        let mut sha = Sha256::new();
+        sha.update(serde_json::to_vec(&self.config).unwrap_or_default());
+        for (name, tensor) in &self.tensors {
+            sha.update(name.as_bytes());
+            sha.update([0]);
+            sha.update(tensor.data.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
+        }
+        sha.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+    }
+
     /// The model inside this library (feature `pretrained`): 9 latent vectors, trained on outdoor panoramas.
     ///
     /// # Panics

@@ -27,6 +27,32 @@ pub struct Batch {
     pub noise: Vec<f32>,
 }
 
+impl Batch {
+    /// The same panoramas in `parts` batches of one size.
+    ///
+    /// # Panics
+    /// If `parts` does not divide their number.
+    pub fn split(&self, parts: usize) -> Vec<Self> {
+        assert!(self.images.is_multiple_of(parts), "{} panoramas in {parts} equal parts", self.images);
+        let part = |values: &[f32], at: usize| {
+            let size = values.len() / parts;
+            values[at * size..][..size].to_vec()
+        };
+        (0..parts)
+            .map(|at| Self {
+                step: self.step,
+                images: self.images / parts,
+                stripe_directions: part(&self.stripe_directions, at),
+                stripe_samples: part(&self.stripe_samples, at),
+                loss_size: self.loss_size,
+                loss_directions: self.loss_directions.clone(),
+                target: part(&self.target, at),
+                noise: part(&self.noise, at),
+            })
+            .collect()
+    }
+}
+
 /// Prepares batches. A batch is a pure function of the configuration and its step.
 #[derive(Debug)]
 pub struct Batches<'a> {

@@ -1,9 +1,10 @@
-//! Training: what defines a run ([`config`], [`presets`]), what one update does ([`batch`], [`step`], [`loss`],
+//! Training: what defines a run ([`config`], [`presets`], [`init`]), what one update does ([`batch`], [`step`], [`loss`],
 //! [`schedule`], [`optimiser`]; of an auto-decoder [`rays`] and [`latents`]), and the loop with its folder ([`run`], [`checkpoint`], [`progress`]).
 
 pub mod batch;
 pub mod checkpoint;
 pub mod config;
+pub mod init;
 pub mod latents;
 mod log;
 pub mod loss;

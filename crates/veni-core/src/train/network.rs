@@ -146,6 +146,17 @@ impl Prepared {
         }
     }
 
+    /// The same in `parts` batches of one size.
+    ///
+    /// # Panics
+    /// If `parts` does not divide the number of panoramas, or the batch is of rays, whose losses belong together.
+    pub fn split(&self, parts: usize) -> Vec<Self> {
+        match self {
+            Self::Panoramas(batch) => batch.split(parts).into_iter().map(Self::Panoramas).collect(),
+            Self::Rays(_) => panic!("the losses of a batch of rays belong together"),
+        }
+    }
+
     /// Panoramas in it.
     pub fn images(&self) -> usize {
         match self {

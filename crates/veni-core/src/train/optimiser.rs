@@ -101,6 +101,16 @@ impl Optimiser {
         Ok(Self { groups, ema_decay, updates: 0, slots })
     }
 
+    /// Other constants for the groups, whose parameters stay.
+    ///
+    /// # Panics
+    /// If the groups are not the same ones.
+    pub fn set_groups(&mut self, groups: Vec<Group>) {
+        let prefixes = |groups: &[Group]| groups.iter().map(|g| g.prefix.clone()).collect::<Vec<_>>();
+        assert_eq!(prefixes(&groups), prefixes(&self.groups), "the optimiser's groups");
+        self.groups = groups;
+    }
+
     /// Number of updates made.
     pub fn updates(&self) -> u64 {
         self.updates
@@ -116,9 +126,22 @@ impl Optimiser {
         grads: &Gradients,
         learning_rates: &[f64],
     ) -> (M, Vec<GroupReport>) {
+        let gradients = weights::gradients(&module, "", grads);
+        self.step_along(module, &gradients, learning_rates)
+    }
+
+    /// [`Optimiser::step`] with gradients by the parameters' paths.
+    ///
+    /// # Panics
+    /// As [`Optimiser::step`].
+    pub fn step_along<M: Module>(
+        &mut self,
+        module: M,
+        grads: &Weights,
+        learning_rates: &[f64],
+    ) -> (M, Vec<GroupReport>) {
         assert_eq!(learning_rates.len(), self.groups.len(), "one learning rate per optimiser group");
-        let grads = weights::gradients(&module, "", grads);
-        let norms = self.norms(&grads);
+        let norms = self.norms(grads);
         self.updates += 1;
         let average_decay = self.ema_decay.min(self.updates as f64 / (self.updates as f64 + 9.0));
         let rules: Vec<_> = (self.groups.iter().zip(learning_rates).zip(&norms))

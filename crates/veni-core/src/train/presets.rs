@@ -1,10 +1,14 @@
 //! Named starting points: `tiny` for tests, `small` for two cores, `paper` for a graphics card.
 
+use std::path::PathBuf;
+
+use toml::{Table, Value};
+
 use crate::data::{AugmentConfig, DataConfig};
 use crate::fit::FitConfig;
 use crate::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 use crate::train::config::{
-    DecoderBy, DeviceKind, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig,
+    DecoderBy, DeviceKind, GroupConfig, LossGrid, Order, ReportConfig, StageConfig, Stored, TrainConfig,
 };
 use crate::train::latents::LatentsConfig;
 use crate::train::loss::LossConfig;
@@ -97,6 +101,43 @@ impl Preset {
     }
 }
 
+/// How much lower the learning rates of fine-tuning are: the authors' (1e-5 and 1e-4 after 1e-4 and 1e-3).
+const FINE: f64 = 10.0;
+
+impl TrainConfig {
+    /// The same run behind a stage `pretrain` of `steps` updates on other panoramas; its own updates become the stage
+    /// `finetune`, with a tenth of the learning rates.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if it has stages already, or is an auto-decoder's.
+    pub fn pretrained_on(mut self, folders: &[PathBuf], steps: u64) -> Result<Self> {
+        if let Some(first) = self.stage.first() {
+            return Err(Error::invalid(format!("the run has a stage {} already", first.name)));
+        }
+        let folders = folders.iter().map(|folder| Value::String(folder.display().to_string())).collect();
+        let data = Table::from_iter([("folders".to_owned(), Value::Array(folders))]);
+        let pretrain = Table::from_iter([("data".to_owned(), Value::Table(data))]);
+        let finetune = self.groups().into_iter().map(|(name, group)| (name.to_owned(), lowered(group)));
+        let (own, finetune) = (self.steps, finetune.collect());
+        self.set_steps(steps + own);
+        self.stage = vec![
+            StageConfig { name: "pretrain".to_owned(), steps, changes: pretrain },
+            StageConfig { name: "finetune".to_owned(), steps: own, changes: finetune },
+        ];
+        self.check().map(|()| self)
+    }
+}
+
+/// The change of a group that lowers its learning rate: `{learning_rate = {rate = …}}`.
+fn lowered(group: &GroupConfig) -> Value {
+    let rates = match group.learning_rate {
+        LearningRate::Constant { rate } | LearningRate::Cosine { rate, .. } => vec![("rate", rate)],
+        LearningRate::Exponential { rate, last, .. } => vec![("rate", rate), ("last", last)],
+    };
+    let rates = rates.into_iter().map(|(name, rate)| (name.to_owned(), Value::Float(rate / FINE)));
+    Value::Table(Table::from_iter([("learning_rate".to_owned(), Value::Table(rates.collect()))]))
+}
+
 /// Augmentation that keeps a sky a sky; chosen for a training set of some dozens.
 fn varied() -> AugmentConfig {
     AugmentConfig {
@@ -129,6 +170,7 @@ fn small(latent_vectors: usize) -> TrainConfig {
         seed: 0,
         steps,
         batch: 4,
+        accumulate: 1,
         order: Order::Shuffle,
         device: DeviceKind::Flex,
         decoder_by: DecoderBy::Kernels,
@@ -171,6 +213,8 @@ fn small(latent_vectors: usize) -> TrainConfig {
             prior_copies: 4,
             stored: Stored::F16,
         },
+        init: None,
+        stage: Vec::new(),
     }
 }
 

@@ -11,6 +11,9 @@ use crate::eval::reconstruction::MeanScores;
 pub struct StepReport {
     /// Number of the update, from 1.
     pub step: u64,
+    /// The stage that it belongs to; absent in a run without stages.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stage: Option<String>,
     /// Weighted sum of the losses.
     pub loss: f64,
     /// Each loss part, times its weight.

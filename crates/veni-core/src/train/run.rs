@@ -2,7 +2,7 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | `config.toml` | the [`TrainConfig`], everything that defines the run |
+//! | `config.toml` | the [`TrainConfig`], everything that defines the run; written last of what a run begins with |
 //! | `metrics.jsonl` | a line per update and per validation |
 //! | `checkpoint/state.safetensors` | weights, Adam's moments, averaged weights, step |
 //! | `preview/step-*.png` | target, reconstruction, random sample |
@@ -12,7 +12,7 @@
 //! A run is a function of its configuration: batches and noise are named by their step, so continuing from a
 //! checkpoint gives the weights of the uninterrupted run to the bit (on one device and number of threads).
 
-use std::fs;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
@@ -22,30 +22,25 @@ use burn::module::Module;
 use burn::tensor::Device;
 use serde::Serialize;
 
-use crate::data::random::{Purpose, stream};
 use crate::data::{Dataset, Splits};
-use crate::eval::metrics::Alignment;
-use crate::eval::reconstruction::Reconstruction;
-use crate::latent::{Latent, Prior};
-use crate::model::{Model, ModelInfo, Training};
-use crate::output::{Overwrite, write_atomic};
 use crate::train::checkpoint::{self, Best, CheckpointInfo};
-use crate::train::config::TrainConfig;
+use crate::train::config::{Stage, TrainConfig};
+use crate::train::init::Initialised;
 use crate::train::log::MetricsLog;
 use crate::train::loss::Loss;
 use crate::train::network::{Network, Prepared};
 use crate::train::optimiser::{Group, Optimiser};
-use crate::train::preview;
 use crate::train::progress::{Progress, StepReport, ValidationReport};
-use crate::vae::{Decoder, weights};
+use crate::vae::weights::{self, Weights};
 use crate::{Error, Result};
 
+mod begin;
 mod results;
+
+pub use begin::{is_free, leftovers};
 
 /// Batches prepared ahead of the one being computed.
 const AHEAD: usize = 2;
-/// Panoramas in a preview.
-const PREVIEW_ROWS: usize = 8;
 
 /// How [`Trainer::run`] came back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,75 +56,28 @@ pub enum Finish {
 pub struct Trainer {
     folder: PathBuf,
     config: TrainConfig,
+    /// Of the run's own `data`.
     splits: Splits,
+    stages: Vec<Running>,
     /// The command line recorded in the model file.
     command: String,
     device: Device,
-    loss: Loss,
     network: Network,
     optimiser: Optimiser,
     best: Option<Best>,
+    initialised: Option<Initialised>,
+}
+
+/// A stage with what it needs.
+#[derive(Clone, Debug)]
+struct Running {
+    stage: Stage,
+    loss: Loss,
+    /// Its own training panoramas; absent if they are the run's, or not needed any more.
+    data: Option<Dataset>,
 }
 
 impl Trainer {
-    /// Starts a run in `folder`, which must not exist or be empty. `command` is recorded in the model file.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] if the folder is in use or the configuration does not fit; what reading the data says.
-    pub fn create(folder: &Path, config: TrainConfig, command: &str) -> Result<Self> {
-        config.check()?;
-        let splits = Splits::open(&config.data, config.seed)?;
-        if folder.exists() && fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?.next().is_some()
-        {
-            let folder = folder.display();
-            return Err(Error::invalid(format!(
-                "{folder}: is not empty; --resume continues a run, or name a new folder"
-            )));
-        }
-        for inner in ["checkpoint", "preview"] {
-            let inner = folder.join(inner);
-            fs::create_dir_all(&inner).map_err(|e| Error::io(&inner, "create", e))?;
-        }
-        let text = config.to_toml()?;
-        let path = folder.join("config.toml");
-        write_atomic(&path, Overwrite::Replace, |out| {
-            std::io::Write::write_all(out, text.as_bytes()).map_err(|e| Error::io(&path, "write", e))
-        })?;
-        Self::fresh(folder, config, splits, command)
-    }
-
-    /// Continues the run in `folder` from its checkpoint (or from the start, if it was ended before its first).
-    ///
-    /// # Errors
-    /// [`Error::Io`] or [`Error::Invalid`] if `config.toml` or the checkpoint cannot be read or do not fit together.
-    pub fn resume(folder: &Path, command: &str) -> Result<Self> {
-        let path = folder.join("config.toml");
-        let text = fs::read_to_string(&path).map_err(|e| Error::io(&path, "read", e))?;
-        let config = TrainConfig::from_toml(&text).map_err(|e| e.in_file(&path))?;
-        let splits = Splits::open(&config.data, config.seed)?;
-        let mut trainer = Self::fresh(folder, config, splits, command)?;
-        let path = trainer.checkpoint_path();
-        if path.exists() {
-            let (state, info) = checkpoint::load(&path)?;
-            trainer.optimiser.restore(state, info.step).map_err(|e| e.in_file(&path))?;
-            trainer.network = weights::write(trainer.network, "", &trainer.optimiser.weights())?;
-            trainer.best = info.best;
-        }
-        Ok(trainer)
-    }
-
-    fn fresh(folder: &Path, config: TrainConfig, splits: Splits, command: &str) -> Result<Self> {
-        let device = config.device.device()?.autodiff();
-        let network = Network::new(&config, splits.train.len(), &device)?;
-        let groups = config.groups().into_iter();
-        let groups =
-            groups.map(|(prefix, group)| Group { prefix: prefix.into(), adam: group.adam }).collect();
-        let optimiser = Optimiser::new(&network, groups, config.ema_decay)?;
-        let loss = Network::loss(&config, &device);
-        let (folder, command) = (folder.to_path_buf(), command.to_owned());
-        Ok(Self { folder, config, splits, command, device, loss, network, optimiser, best: None })
-    }
-
     /// What defines this run.
     pub fn config(&self) -> &TrainConfig {
         &self.config
@@ -145,31 +93,57 @@ impl Trainer {
         &self.network
     }
 
+    /// What a run that was just created has from `config.init`.
+    pub fn initialised(&self) -> Option<Initialised> {
+        self.initialised
+    }
+
     /// Trains until all updates are made or `stop` is raised, which is looked at before every update.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the loss is no longer finite; [`Error::Io`] if a file of the run cannot be written.
     pub fn run(&mut self, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Finish> {
-        let mut log = MetricsLog::open(&self.folder.join("metrics.jsonl"), self.steps_done())?;
-        let (first, total) = (self.steps_done() + 1, self.config.steps);
-        progress.start(first - 1, total);
-        let splits = self.splits.clone();
-        let batches = self.network.source(&self.config, &splits.train)?;
-        let finish = std::thread::scope(|scope| {
+        let total = self.config.steps;
+        let mut log = MetricsLog::open(&self.folder.join("metrics.jsonl"), self.steps_done(), total)?;
+        progress.start(self.steps_done(), total);
+        for at in 0..self.stages.len() {
+            if self.stages[at].stage.end() > self.steps_done()
+                && self.stage(at, stop, progress, &mut log)? == Finish::Stopped
+            {
+                return Ok(Finish::Stopped);
+            }
+            // a stage's panoramas go with it
+            self.stages[at].data = None;
+        }
+        self.finish(&mut log, progress)?;
+        Ok(Finish::Complete)
+    }
+
+    fn stage(
+        &mut self,
+        at: usize,
+        stop: &AtomicBool,
+        progress: &mut dyn Progress,
+        log: &mut MetricsLog,
+    ) -> Result<Finish> {
+        let Running { stage, loss, data } = self.stages[at].clone();
+        self.optimiser.set_groups(groups(&stage.config));
+        let train = data.unwrap_or_else(|| self.splits.train.clone());
+        let batches = self.network.source(&stage.config, &train)?;
+        let steps = self.steps_done() - stage.first + 1..=stage.config.steps;
+        std::thread::scope(|scope| {
             let (send, receive) = mpsc::sync_channel(AHEAD);
             // ends early when nobody receives any more
-            scope.spawn(move || (first..=total).all(|step| send.send(batches.prepare(step)).is_ok()));
+            scope.spawn(move || steps.into_iter().all(|step| send.send(batches.prepare(step)).is_ok()));
             // `receive` is moved in, so that whatever ends the loop also ends the thread
-            self.updates(receive, stop, progress, &mut log)
-        })?;
-        if finish == Finish::Complete {
-            self.finish(&mut log, progress)?;
-        }
-        Ok(finish)
+            self.updates(&stage, &loss, receive, stop, progress, log)
+        })
     }
 
     fn updates(
         &mut self,
+        stage: &Stage,
+        loss: &Loss,
         batches: mpsc::Receiver<Prepared>,
         stop: &AtomicBool,
         progress: &mut dyn Progress,
@@ -181,45 +155,44 @@ impl Trainer {
         let due = |step: u64, every: u64| every > 0 && step.is_multiple_of(every);
         for batch in batches {
             if stop.load(Ordering::Relaxed) {
-                self.checkpoint(progress)?;
+                self.checkpoint(log, progress)?;
                 return Ok(Finish::Stopped);
             }
-            let update = self.update(&batch)?;
+            let update = self.update(stage, loss, batch)?;
             // a running mean: steady against single slow updates, quick to follow a changed machine
             let mean = pace.map_or(update.seconds, |p: f64| p + 0.05 * (update.seconds - p));
             pace = Some(mean);
             let step = update.step;
             log.append(&update)?;
             progress.step(&update, mean * (total - step) as f64);
-            if due(step, report.validate_every) && step != total {
+            if (due(step, report.validate_every) || step == stage.end()) && step != total {
                 self.validate(log, progress)?;
             }
             if due(step, report.preview_every) && step != total {
                 self.preview(progress)?;
             }
-            if due(step, report.checkpoint_every) || step == total {
-                self.checkpoint(progress)?;
+            if due(step, report.checkpoint_every) || step == stage.end() {
+                self.checkpoint(log, progress)?;
             }
         }
         Ok(Finish::Complete)
     }
 
     /// One update.
-    fn update(&mut self, batch: &Prepared) -> Result<StepReport> {
+    fn update(&mut self, stage: &Stage, loss: &Loss, batch: Prepared) -> Result<StepReport> {
         let clock = Instant::now();
-        let step = batch.step();
-        let by = self.config.decoder_by;
-        let (terms, gradients) = self.network.gradients(batch, &self.loss, by, &self.device);
-        let value = f64::from(terms.total().into_scalar::<f32>());
+        let (local, images) = (batch.step(), batch.images());
+        let step = stage.first + local;
+        let Computed { value, parts, gradients } = self.gradients(stage, loss, batch);
         if !value.is_finite() {
             return Err(Error::invalid(format!(
                 "the loss is {value} at update {step}: lower the learning rates or the clipping norm"
             )));
         }
         // schedules count from 0: with a warm-up the first update has rate 0, as the authors' has
-        let configured = self.config.groups();
-        let rates: Vec<_> = configured.iter().map(|(_, group)| group.learning_rate.at(step - 1)).collect();
-        let (network, groups) = self.optimiser.step(self.network.clone(), &gradients, &rates);
+        let configured = stage.config.groups();
+        let rates: Vec<_> = configured.iter().map(|(_, group)| group.learning_rate.at(local - 1)).collect();
+        let (network, groups) = self.optimiser.step_along(self.network.clone(), &gradients, &rates);
         self.network = network;
         let seconds = clock.elapsed().as_secs_f64();
         let by_name = |f: &dyn Fn(usize) -> f64| {
@@ -227,20 +200,41 @@ impl Trainer {
         };
         Ok(StepReport {
             step,
+            stage: stage.name.clone(),
             loss: value,
-            parts: terms
-                .terms
-                .into_iter()
-                .map(|t| (t.name, f64::from(t.value.into_scalar::<f32>())))
-                .collect(),
+            parts,
             learning_rate: by_name(&|i| groups[i].learning_rate),
             gradient_norm: by_name(&|i| groups[i].gradient_norm),
             seconds,
-            images_per_second: batch.images() as f64 / seconds,
+            images_per_second: images as f64 / seconds,
         })
     }
 
-    fn checkpoint(&self, progress: &mut dyn Progress) -> Result<()> {
+    /// Loss and gradients of a batch, computed in as many parts as the stage says.
+    fn gradients(&self, stage: &Stage, loss: &Loss, batch: Prepared) -> Computed {
+        let count = stage.config.accumulate;
+        if count == 1 {
+            return self.part(loss, &batch);
+        }
+        let mut sum = Computed::default();
+        for batch in batch.split(count) {
+            sum.add(self.part(loss, &batch));
+        }
+        sum.divided(count)
+    }
+
+    fn part(&self, loss: &Loss, batch: &Prepared) -> Computed {
+        let by = self.config.decoder_by;
+        let (terms, gradients) = self.network.gradients(batch, loss, by, &self.device);
+        let value = f64::from(terms.total().into_scalar::<f32>());
+        let gradients = weights::gradients(&self.network, "", &gradients);
+        let number = |t: crate::train::loss::Term| (t.name, f64::from(t.value.into_scalar::<f32>()));
+        Computed { value, parts: terms.terms.into_iter().map(number).collect(), gradients }
+    }
+
+    fn checkpoint(&self, log: &MetricsLog, progress: &mut dyn Progress) -> Result<()> {
+        // a state that is on disk must find its lines there too
+        log.sync()?;
         let path = self.checkpoint_path();
         checkpoint::save(&path, &self.optimiser.state(), &CheckpointInfo::new(self.steps_done(), self.best))?;
         progress.wrote(&path);
@@ -248,8 +242,54 @@ impl Trainer {
     }
 
     fn checkpoint_path(&self) -> PathBuf {
-        self.folder.join("checkpoint").join("state.safetensors")
+        checkpoint_path(&self.folder)
     }
+}
+
+/// What a batch, or a part of one, says.
+#[derive(Debug, Default)]
+struct Computed {
+    value: f64,
+    parts: BTreeMap<&'static str, f64>,
+    gradients: Weights,
+}
+
+impl Computed {
+    fn add(&mut self, other: Self) {
+        self.value += other.value;
+        for (name, value) in other.parts {
+            *self.parts.entry(name).or_default() += value;
+        }
+        for (name, gradient) in other.gradients {
+            match self.gradients.get_mut(&name) {
+                Some(sum) => sum.data.iter_mut().zip(&gradient.data).for_each(|(s, g)| *s += g),
+                None => drop(self.gradients.insert(name, gradient)),
+            }
+        }
+    }
+
+    fn divided(mut self, count: usize) -> Self {
+        let share = 1.0 / count as f64;
+        self.value *= share;
+        self.parts.values_mut().for_each(|value| *value *= share);
+        for gradient in self.gradients.values_mut() {
+            gradient.data.iter_mut().for_each(|g| *g *= share as f32);
+        }
+        self
+    }
+}
+
+fn checkpoint_path(folder: &Path) -> PathBuf {
+    folder.join("checkpoint").join("state.safetensors")
+}
+
+/// The optimiser's groups.
+fn groups(config: &TrainConfig) -> Vec<Group> {
+    let group = |(prefix, group): (&str, &crate::train::config::GroupConfig)| Group {
+        prefix: prefix.into(),
+        adam: group.adam,
+    };
+    config.groups().into_iter().map(group).collect()
 }
 
 #[derive(Serialize)]

@@ -1,12 +1,17 @@
 //! Whole runs of the tiny preset on synthetic skies.
 
+use std::fs;
+
 use super::*;
+use crate::data::random::{Purpose, stream};
+use crate::latent::Latent;
+use crate::model::Model;
 use crate::panorama::{Panorama, Precision, WriteFormat, WriteOptions};
 use crate::sphere::Equirect;
 use crate::train::config::DecoderBy;
 use crate::train::loss::LossForm;
 use crate::train::presets::Preset;
-use crate::train::schedule::WeightSchedule;
+use crate::train::schedule::{LearningRate, WeightSchedule};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// A sky with a sun at `azimuth` over dark ground.
@@ -254,9 +259,10 @@ fn gradients_match(run: &Path, config: TrainConfig) {
     let trainer = Trainer::create(run, config, "test").unwrap();
     let veni = trainer.network().clone();
     let batch = veni.source(trainer.config(), &trainer.splits.train).unwrap().prepare(1);
-    let value = |veni: &Network| veni.terms(&batch, &trainer.loss, &trainer.device).total();
+    let loss_of = &trainer.stages[0].loss;
+    let value = |veni: &Network| veni.terms(&batch, loss_of, &trainer.device).total();
     let both = [DecoderBy::Tensors, DecoderBy::Kernels].map(|by| {
-        let (terms, gradients) = veni.gradients(&batch, &trainer.loss, by, &trainer.device);
+        let (terms, gradients) = veni.gradients(&batch, loss_of, by, &trainer.device);
         (terms.total().into_scalar::<f32>(), weights::gradients(&veni, "", &gradients))
     });
     let [(loss, gradients), (kernel_loss, by_kernels)] = both;
@@ -299,4 +305,141 @@ fn gradients_match(run: &Path, config: TrainConfig) {
         "only {checked} of {} slopes rise above the noise",
         gradients.len()
     );
+}
+
+/// The run with `[[stage]]` sections as they stand in a file.
+fn staged(config: &TrainConfig, stages: &str) -> TrainConfig {
+    let text = config.to_toml().unwrap() + stages;
+    TrainConfig::from_toml(&text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn a_single_stage_is_the_run_without_stages() {
+    let (folder, config) = setup(6);
+    let [plain, one] = ["plain", "one"].map(|name| folder.path().join(name));
+    complete(&mut Trainer::create(&plain, config.clone(), "test").unwrap());
+    let config = staged(&config, "\n[[stage]]\nname = \"all\"\nsteps = 6\n");
+    complete(&mut Trainer::create(&one, config, "test").unwrap());
+    for name in ["checkpoint/state.safetensors", "model.safetensors", "preview/step-000006.png"] {
+        assert!(file(&plain, name) == file(&one, name), "{name}");
+    }
+}
+
+#[test]
+fn each_stage_has_its_own_data_rates_and_schedules() {
+    let (folder, mut config) = setup(7);
+    // other skies, and one that validates the run
+    let first = folder.path().join("first");
+    fs::create_dir(&first).unwrap();
+    for (name, azimuth) in [("d", 1.0), ("e", 5.0)] {
+        let path = first.join(name).with_extension("exr");
+        sky(azimuth).write(&path, &WriteOptions::new(WriteFormat::Exr(Precision::Float))).unwrap();
+    }
+    config.report.validate_every = 0;
+    let stages = format!(
+        "\n[[stage]]\nname = \"a\"\nsteps = 4\nbatch = 1\ndata.folders = [{first:?}, {:?}]\nloss.kld = 0\n\
+         \n[[stage]]\nname = \"b\"\nsteps = 3\ndecoder.learning_rate.rate = 0.25\ndecoder.learning_rate.warm_up = 1\n",
+        folder.path().join("data/val/c.exr")
+    );
+    let config = staged(&config, &stages);
+    let out = folder.path().join("run");
+    let mut trainer = Trainer::create(&out, config.clone(), "test").unwrap();
+    let own = trainer.stages[0].data.as_ref().unwrap();
+    let names: Vec<_> = own.items().iter().map(crate::data::Item::name).collect();
+    assert_eq!(names, ["d", "e"], "what validates is not trained on");
+    complete(&mut trainer);
+    let text = String::from_utf8(file(&out, "metrics.jsonl")).unwrap();
+    let lines: Vec<serde_json::Value> = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    let updates: Vec<_> = lines.iter().filter(|line| line.get("loss").is_some()).collect();
+    let stages: Vec<_> = updates.iter().map(|line| line["stage"].as_str().unwrap()).collect();
+    assert_eq!(stages.concat(), "aaaabbb");
+    assert_eq!(
+        updates.iter().map(|line| line["step"].as_u64().unwrap()).collect::<Vec<_>>(),
+        [1, 2, 3, 4, 5, 6, 7]
+    );
+    assert!(updates[..4].iter().all(|line| line["parts"].get("kld").is_none()));
+    assert!(updates[4..].iter().all(|line| line["parts"].get("kld").is_some()));
+    // rates count from the stage's first update, and fall until its last
+    let rate = |at: usize| updates[at]["learning_rate"]["decoder"].as_f64().unwrap();
+    assert_eq!((rate(0), rate(4), rate(5)), (0.0, 0.0, 0.25));
+    let LearningRate::Cosine { rate: high, warm_up, floor, .. } = config.decoder.learning_rate else {
+        panic!("tiny's schedule")
+    };
+    let own = LearningRate::Cosine { rate: high, warm_up, steps: 4, floor, periodic: false };
+    assert_eq!(rate(3), own.at(3));
+    // validated where a stage ends
+    let validations = lines.iter().filter(|line| line.get("validation").is_some());
+    assert_eq!(validations.map(|line| line["step"].as_u64().unwrap()).collect::<Vec<_>>(), [4, 7]);
+    let training = Model::load(out.join("model.safetensors")).unwrap().info().training.clone().unwrap();
+    assert_eq!(training.data, "2 panoramas of data; a: first, c.exr");
+}
+
+/// The losses are means over the batch: in how many parts it is computed changes nothing but rounding.
+#[test]
+fn accumulated_gradients_are_those_of_the_whole_batch() {
+    let (folder, mut config) = setup(1);
+    config.batch = 4;
+    config.loss.log_mse = WeightSchedule::Constant(0.3);
+    config.loss.hdr_mse = WeightSchedule::Constant(0.3);
+    for form in [LossForm::Corrected, LossForm::Reference] {
+        config.loss.form = form;
+        let computed = |accumulate: usize, batch: usize| {
+            let mut config = config.clone();
+            (config.accumulate, config.batch) = (accumulate, batch);
+            let out = folder.path().join(format!("{form:?}-{accumulate}-{batch}"));
+            let trainer = Trainer::create(&out, config, "test").unwrap();
+            let running = &trainer.stages[0];
+            let source = trainer.network.source(&running.stage.config, &trainer.splits.train).unwrap();
+            trainer.gradients(&running.stage, &running.loss, source.prepare(1))
+        };
+        let whole = computed(1, 4);
+        for parts in [2, 4] {
+            let sum = computed(parts, 4);
+            assert_eq!(sum.parts.len(), whole.parts.len());
+            for (name, value) in &whole.parts {
+                // a mean whose largest terms are a sun's rounds at 1.5e-5
+                let other = sum.parts[name];
+                assert!(
+                    (other - value).abs() < 1e-4 * value,
+                    "{form:?}, {parts} parts, {name}: {other} {value}"
+                );
+            }
+            let distance = distance(&sum, &whole);
+            assert!(distance < 1e-4, "{form:?}, {parts} parts: {distance}");
+        }
+        // half of the batch is something else
+        assert!(distance(&computed(1, 2), &whole) > 1e-2);
+    }
+}
+
+/// The largest relative difference of a parameter's gradient.
+fn distance(a: &Computed, b: &Computed) -> f64 {
+    let norm =
+        |values: &mut dyn Iterator<Item = f32>| values.map(|v| f64::from(v).powi(2)).sum::<f64>().sqrt();
+    let largest = norm(&mut b.gradients.values().flat_map(|g| g.data.iter().copied()));
+    let one = |(name, g): (&String, &weights::Weight)| {
+        let other = &b.gradients[name];
+        let difference = norm(&mut g.data.iter().zip(&other.data).map(|(x, y)| x - y));
+        // parameters whose gradient is rounding alone are measured by the whole
+        difference / norm(&mut other.data.iter().copied()).max(1e-3 * largest)
+    };
+    a.gradients.iter().map(one).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_run_that_ended_while_it_began_can_be_begun_again() {
+    let (folder, config) = setup(1);
+    let out = folder.path().join("run");
+    fs::create_dir_all(out.join("checkpoint")).unwrap();
+    fs::write(out.join("checkpoint/.state.safetensors.0123456789abcdef-0.part"), "half").unwrap();
+    assert!(is_free(&out).unwrap());
+    complete(&mut Trainer::create(&out, config.clone(), "test").unwrap());
+    assert!(leftovers(&out).unwrap().is_empty() && !is_free(&out).unwrap());
+    // a checkpoint of work done is never overwritten
+    fs::remove_file(out.join("config.toml")).unwrap();
+    for name in ["metrics.jsonl", "model.safetensors"] {
+        fs::remove_file(out.join(name)).unwrap();
+    }
+    fs::remove_dir_all(out.join("preview")).unwrap();
+    assert!(Trainer::create(&out, config, "test").unwrap_err().to_string().contains("not empty"));
 }

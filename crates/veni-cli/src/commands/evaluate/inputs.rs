@@ -109,8 +109,11 @@ pub(super) fn check_folder(out: &Path) -> Result<()> {
     if !out.is_dir() {
         bail!("{}: is a file; name a folder for the evaluation with --out", out.display());
     }
-    let mut entries = std::fs::read_dir(out).map_err(|e| Error::io(out, "list", e))?;
-    if entries.next().is_some() && !out.join(MARKER).is_file() {
+    // a shard that begins at the same time may be writing the marker: hidden files say nothing
+    let entries = std::fs::read_dir(out).map_err(|e| Error::io(out, "list", e))?;
+    let is_hidden = |name: &std::ffi::OsStr| name.as_encoded_bytes().starts_with(b".");
+    let used = entries.into_iter().any(|entry| entry.is_ok_and(|e| !is_hidden(&e.file_name())));
+    if used && !out.join(MARKER).is_file() {
         bail!("{}: is not empty and no evaluation's folder; name a new one with --out", out.display());
     }
     writable(out, out)

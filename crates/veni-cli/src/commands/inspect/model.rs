@@ -60,7 +60,15 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     match &info.training {
         Some(t) => facts.add(
             "training",
-            format!("{}; {} steps, seed {}\n{:17}{}", t.data, t.steps, t.seed, "", t.command),
+            format!(
+                "{}; {} steps, seed {}{}\n{:17}{}",
+                t.data,
+                t.steps,
+                t.seed,
+                t.init.as_ref().map(|init| format!(", begun with {init}")).unwrap_or_default(),
+                "",
+                t.command
+            ),
             json!(t),
         ),
         None => facts.add("training", "unknown", Value::Null),

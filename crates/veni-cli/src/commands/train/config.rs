@@ -6,9 +6,11 @@ use anyhow::{Context, Result, anyhow, bail};
 use veni_core::Error;
 use veni_core::model::Model;
 use veni_core::train::config::TrainConfig;
+use veni_core::train::init::InitConfig;
 use veni_core::train::presets::Preset;
 
 use super::{PresetName, SystemName, Train, shell_word};
+use crate::source;
 
 impl Train {
     /// All settings: preset or file, then the options, then `--set`.
@@ -36,6 +38,13 @@ impl Train {
         if let Some(steps) = self.steps {
             config = config.with_overrides(&[format!("steps={steps}")])?;
         }
+        if let Some(init) = &self.init {
+            config.init = Some(InitConfig { model: source::model_file(init)?, digest: None });
+        }
+        if !self.pretrain.is_empty() {
+            let steps = self.pretrain_steps.unwrap_or(config.steps);
+            config = config.pretrained_on(&self.pretrain, steps).context("--pretrain")?;
+        }
         let config = config.with_overrides(&self.set).context("--set")?;
         config.check()?;
         Ok(config)
@@ -44,7 +53,9 @@ impl Train {
     /// With `--resume`: whatever else was typed must be what the run was begun with.
     pub(super) fn check_same(&self, stored: &Path) -> Result<()> {
         let described = !self.data.is_empty() || self.config.is_some();
-        let changed = self.system.is_some()
+        let begun = self.init.is_some() || !self.pretrain.is_empty();
+        let changed = begun
+            || self.system.is_some()
             || self.preset.is_some()
             || self.latent_vectors.is_some()
             || self.seed.is_some()
@@ -61,7 +72,12 @@ impl Train {
                 self.out.display()
             );
         }
-        let (old, new) = (read(stored)?.to_toml()?, self.settings()?.to_toml()?);
+        let (old, mut new) = (read(stored)?, self.settings()?);
+        if let (Some(old), Some(new)) = (&old.init, &mut new.init) {
+            // known only once the model was read
+            new.digest = new.digest.take().or_else(|| old.digest.clone());
+        }
+        let (old, new) = (old.to_toml()?, new.to_toml()?);
         let differing = old.lines().zip(new.lines()).find(|(a, b)| a != b);
         match differing {
             Some((old, new)) => bail!(
@@ -96,6 +112,12 @@ impl Train {
         if let Some(config) = &self.config {
             words.push(format!("--config {}", last(config)));
         }
+        for folder in &self.pretrain {
+            words.push(format!("--pretrain {}", last(folder)));
+        }
+        if let Some(init) = &self.init {
+            words.push(format!("--init {}", last(init)));
+        }
         if self.system == Some(SystemName::Reni) {
             words.push("--system reni++".to_owned());
         }
@@ -106,6 +128,7 @@ impl Train {
             ("--latent-vectors", self.latent_vectors.map(|n| n as u64)),
             ("--seed", self.seed),
             ("--steps", self.steps),
+            ("--pretrain-steps", self.pretrain_steps),
         ];
         words.extend(numbers.into_iter().filter_map(|(name, n)| Some(format!("{name} {}", n?))));
         words.extend(self.set.iter().map(|set| format!("--set {}", shell_word(Path::new(set)))));

@@ -35,7 +35,8 @@ impl progress::Progress for Watch {
             bar.set(step.step, || {
                 let parts: Vec<_> =
                     step.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
-                format!("loss {:.4} ({})", step.loss, parts.join(", "))
+                let stage = step.stage.as_ref().map(|stage| format!("{stage}, ")).unwrap_or_default();
+                format!("{stage}loss {:.4} ({})", step.loss, parts.join(", "))
             });
         }
     }

@@ -4,7 +4,7 @@
 //! are the experiment: trained alike but for one part.
 
 use super::quality::{self, Scored, reconstruct};
-use super::{Evaluation, Report, consistency, equivariance};
+use super::{Evaluation, Report, Share, consistency, equivariance, reconstruction};
 use crate::Result;
 use crate::eval::codec::{Autoencoder, Codec, Optimised};
 use crate::eval::fitting::FitSettings;
@@ -55,6 +55,15 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     table.note(quality::NOTE);
     table.note(run.optimised_note());
     Ok(Report { tables: vec![table], ..Report::default() })
+}
+
+/// The share of the work that it has in common with `reconstruction` and `consistency`.
+///
+/// # Errors
+/// As theirs.
+pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+    reconstruction::keep_models(run, share)?;
+    run.subjects.iter().try_for_each(|subject| consistency::keep_standard(run, subject, share))
 }
 
 fn no_encoder() -> Cell {

@@ -6,8 +6,8 @@
 
 use serde_json::json;
 
-use super::work::kept;
-use super::{Evaluation, Report};
+use super::work::Work;
+use super::{Evaluation, Report, Share};
 use crate::data::random::{Purpose, normal, stream};
 use crate::eval::figure::{Axis, Plot, Series};
 use crate::eval::metrics::{log_error, spearman, weighted_log_error};
@@ -44,9 +44,9 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     ];
     let mut table = Table::new("consistency", "Consistency of latent and image distances", &columns);
     for subject in run.subjects {
-        let standard = distances(run, subject, Source::Standard, pairs)?;
+        let standard = distances(run, subject, Source::Standard, pairs).all(run)?.concat();
         let own = if subject.model().has_prior() {
-            Some(distances(run, subject, Source::Prior, pairs)?)
+            Some(distances(run, subject, Source::Prior, pairs).all(run)?.concat())
         } else {
             None
         };
@@ -77,6 +77,26 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     Ok(report)
 }
 
+/// The distances of a share of the blocks of pairs.
+///
+/// # Errors
+/// As [`run`].
+pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+    let pairs = pairs(run)?;
+    for subject in run.subjects {
+        distances(run, subject, Source::Standard, pairs).keep(run, share)?;
+        if subject.model().has_prior() {
+            distances(run, subject, Source::Prior, pairs).keep(run, share)?;
+        }
+    }
+    Ok(())
+}
+
+/// Of [`standard`] alone.
+pub(super) fn keep_standard(run: &Evaluation<'_>, subject: &Subject, share: Share) -> Result<()> {
+    distances(run, subject, Source::Standard, pairs(run)?).keep(run, share)
+}
+
 fn pairs(run: &Evaluation<'_>) -> Result<usize> {
     let pairs = run.settings.pairs.unwrap_or(if run.settings.quick { 200 } else { 1000 });
     if pairs < 3 {
@@ -87,7 +107,8 @@ fn pairs(run: &Evaluation<'_>) -> Result<usize> {
 
 /// Spearman's correlation for N(0, 1) latents over all pixels alike, the paper's number.
 pub(super) fn standard(run: &Evaluation<'_>, subject: &Subject) -> Result<Cell> {
-    Ok(correlation(&distances(run, subject, Source::Standard, pairs(run)?)?, 1))
+    let distances = distances(run, subject, Source::Standard, pairs(run)?).all(run)?.concat();
+    Ok(correlation(&distances, 1))
 }
 
 fn correlation(distances: &[[f64; 3]], column: usize) -> Cell {
@@ -95,15 +116,20 @@ fn correlation(distances: &[[f64; 3]], column: usize) -> Cell {
     spearman(&of(0), &of(column)).map_or_else(|| Cell::missing("undefined"), |r| Cell::Number(r, 3))
 }
 
-/// Per pair: the squared difference of latents, of images, and of images by solid angle.
-fn distances(run: &Evaluation<'_>, subject: &Subject, source: Source, pairs: usize) -> Result<Vec<[f64; 3]>> {
+/// Per block of pairs, for each: the squared difference of latents, of images, and of images by solid angle.
+fn distances<'a>(
+    run: &Evaluation<'a>,
+    subject: &'a Subject,
+    source: Source,
+    pairs: usize,
+) -> Work<'a, Vec<[f64; 3]>> {
     let (grid, seed) = (run.data.grid(), run.settings.seed);
     let label = match source {
         Source::Standard => "standard",
         Source::Prior => "prior",
     };
     let prior = subject.prior();
-    let draw = |pair: usize, slot: u64| -> Latent {
+    let draw = move |pair: usize, slot: u64| -> Latent {
         let mut rng = stream(seed, Purpose::Evaluation, pair as u64, slot);
         match source {
             Source::Standard => {
@@ -125,7 +151,7 @@ fn distances(run: &Evaluation<'_>, subject: &Subject, source: Source, pairs: usi
     };
     let keys: Vec<_> = blocks.iter().map(key).collect();
     let task = format!("{}, {BATCH} pairs each", subject.name());
-    let found = kept(run, ("block", &task), &keys, |index| {
+    Work::new("block", task, keys, move |index| {
         let one = |pair: usize| {
             let latents = [draw(pair, 0), draw(pair, 1)];
             let images = subject.decode(grid, &latents)?;
@@ -137,6 +163,5 @@ fn distances(run: &Evaluation<'_>, subject: &Subject, source: Source, pairs: usi
             ])
         };
         blocks[index].clone().map(one).collect::<Result<Vec<_>>>()
-    })?;
-    Ok(found.concat())
+    })
 }

@@ -4,7 +4,7 @@
 //! one in the model file; models of one D are joined to a curve.
 
 use super::quality::{self, reconstruct};
-use super::{Evaluation, Report};
+use super::{Evaluation, Report, Share, reconstruction};
 use crate::eval::figure::{Axis, Plot, Series};
 use crate::eval::subject::Subject;
 use crate::eval::table::{Cell, Table};
@@ -60,6 +60,14 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     )?;
     report.tables = vec![table];
     Ok(report)
+}
+
+/// The codes of a share of the panoramas.
+///
+/// # Errors
+/// As coding and writing fail.
+pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+    reconstruction::keep_models(run, share)
 }
 
 fn curve(subject: &Subject, pass: &str) -> String {

@@ -10,7 +10,6 @@ use std::f64::consts::TAU;
 
 use burn::tensor::{Tensor, TensorData};
 
-use super::work::parallel;
 use super::{Evaluation, Report};
 use crate::Result;
 use crate::data::augment::{mirror, turn_columns};
@@ -18,6 +17,7 @@ use crate::eval::figure::{Axis, Plot, Series};
 use crate::eval::subject::Subject;
 use crate::eval::table::{Cell, Table};
 use crate::latent::{Latent, Prior};
+use crate::parallel::parallel;
 use crate::sphere::Equirect;
 
 /// Latents that stand for all where there is no encoder to give some.

@@ -5,8 +5,8 @@
 //! of log radiance between neighbours; reported is the largest step relative to the mean (1: perfectly even), and the
 //! length of the way relative to the direct distance of its ends (1: straight).
 
-use super::quality::codes;
-use super::{Evaluation, Report};
+use super::quality::{codes, coding};
+use super::{Evaluation, Report, Share};
 use crate::eval::codec::{Autoencoder, Codec, Optimised, model::latent};
 use crate::eval::figure::{Axis, Plot, Series, Sheet, display};
 use crate::eval::fitting::FitSettings;
@@ -94,12 +94,26 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     Ok(report)
 }
 
+/// The codes of a share of the panoramas.
+///
+/// # Errors
+/// As coding and writing fail.
+pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+    run.subjects.iter().try_for_each(|subject| coding(run, &*codec(run, subject)).keep(run, share))
+}
+
+/// What gives the ends their latents.
+fn codec<'a>(run: &Evaluation<'a>, subject: &'a Subject) -> Box<dyn Codec + 'a> {
+    let fit = FitSettings::thorough(run.data.grid(), run.settings.quick);
+    match Autoencoder::new(subject) {
+        Some(pass) => Box::new(pass),
+        None => Box::new(Optimised::new(subject, fit)),
+    }
+}
+
 fn ways(run: &Evaluation<'_>, subject: &Subject) -> Result<Vec<Way>> {
     let (grid, frames) = (run.data.grid(), run.settings.frames);
-    let fit = FitSettings::thorough(grid, run.settings.quick);
-    let (pass, optimised) = (Autoencoder::new(subject), Optimised::new(subject, fit));
-    let codec: &dyn Codec = pass.as_ref().map_or(&optimised as &dyn Codec, |pass| pass);
-    let latents: Vec<_> = codes(run, codec)?.iter().map(|code| latent(code)).collect();
+    let latents: Vec<_> = codes(run, &*codec(run, subject))?.iter().map(|code| latent(code)).collect();
     let names: Vec<_> = run.data.items().iter().map(crate::data::Item::name).collect();
     let way = |(pair, names): (&[Latent], &[String])| {
         let at = |k: usize| k as f32 / (frames - 1) as f32;

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::quality::{self, Quality, rate};
-use super::work::{images, kept};
-use super::{Evaluation, Report};
+use super::work::{Work, images};
+use super::{Evaluation, Report, Share};
 use crate::data::Item;
 use crate::eval::figure::{Axis, Plot, Series, Sheet, display};
 use crate::eval::metrics::{Alignment, psnr};
@@ -135,7 +135,19 @@ fn mean(rows: &[One]) -> One {
     }
 }
 
-fn swept(run: &Evaluation<'_>, subject: &Subject, set: Set, ks: f32) -> Result<Vec<One>> {
+/// The fits of a share of the panoramas.
+///
+/// # Errors
+/// As rendering, fitting and writing fail.
+pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+    let set = if run.settings.quick { QUICK } else { WHOLE };
+    for subject in run.subjects {
+        set.sweep.iter().try_for_each(|ks| fits(run, subject, set, *ks).keep(run, share))?;
+    }
+    Ok(())
+}
+
+fn fits<'a>(run: &Evaluation<'a>, subject: &'a Subject, set: Set, ks: f32) -> Work<'a, Found> {
     let (grid, items) = (run.data.grid(), run.data.items());
     let keys: Vec<_> = (items.iter().zip(images(run)))
         .map(|(item, image)| Key {
@@ -148,10 +160,15 @@ fn swept(run: &Evaluation<'_>, subject: &Subject, set: Set, ks: f32) -> Result<V
         })
         .collect();
     let task = format!("{}, K_s = {ks}", subject.name());
-    let found = kept(run, ("panorama", &task), &keys, |i| {
+    Work::new("panorama", task, keys, move |i| {
         fitted(subject, grid, &items[i], set, ks)
             .map_err(|e| Error::invalid(format!("{}: {e}", subject.name())))
-    })?;
+    })
+}
+
+fn swept(run: &Evaluation<'_>, subject: &Subject, set: Set, ks: f32) -> Result<Vec<One>> {
+    let (grid, items) = (run.data.grid(), run.data.items());
+    let found = fits(run, subject, set, ks).all(run)?;
     let one = |(item, found): (&Item, &Found)| -> Result<One> {
         let image = subject.decode(grid, &[Latent::new(found.vectors.clone())])?.concat();
         let quality = rate(grid, item, &image, run.lpips)?;

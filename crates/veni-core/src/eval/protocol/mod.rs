@@ -12,7 +12,8 @@
 //! | [`inverse_rendering`] | what does a shaded ball tell of the light on it? |
 //! | [`paper`] | all of them, with published numbers beside ours |
 //!
-//! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image.
+//! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image; a
+//! [`Share`] of it can be computed beforehand, elsewhere.
 
 pub mod ablations;
 pub mod consistency;
@@ -23,12 +24,15 @@ pub mod inverse_rendering;
 pub mod paper;
 mod quality;
 pub mod reconstruction;
+mod share;
 #[cfg(test)]
 mod tests;
 pub mod uniqueness;
 mod work;
 
 use std::path::{Path, PathBuf};
+
+pub use share::Share;
 
 use super::codec::{Autoencoder, Codec, Optimised};
 use super::figure::{Plot, Sheet};

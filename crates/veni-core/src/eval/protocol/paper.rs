@@ -9,8 +9,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    Evaluation, Report, ablations, consistency, dataset_size, equivariance, interpolation, inverse_rendering,
-    reconstruction, uniqueness,
+    Evaluation, Report, Share, ablations, consistency, dataset_size, equivariance, interpolation,
+    inverse_rendering, reconstruction, uniqueness,
 };
 use crate::eval::table::{Cell, Column, Table};
 use crate::{Error, Result};
@@ -135,6 +135,17 @@ pub fn run(run: &Evaluation<'_>, published: &Published) -> Result<Report> {
         first.note("No table of training set sizes: it needs models that were trained on different numbers of panoramas.");
     }
     Ok(report)
+}
+
+/// The share of every protocol that keeps anything; what the others need is among it.
+///
+/// # Errors
+/// As theirs.
+pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+    reconstruction::keep(run, share)?;
+    uniqueness::keep(run, share)?;
+    consistency::keep(run, share)?;
+    inverse_rendering::keep(run, share)
 }
 
 /// The protocol's answer gets published numbers beside it.

@@ -7,7 +7,7 @@
 use serde_json::json;
 
 use super::Evaluation;
-use super::work::{images, kept, parallel};
+use super::work::{Work, images};
 use crate::Result;
 use crate::data::Item;
 use crate::eval::codec::Codec;
@@ -16,6 +16,7 @@ use crate::eval::metrics::{Alignment, scores};
 use crate::eval::store::Key;
 use crate::eval::table::Cell;
 use crate::panorama::tonemap::srgb_q98;
+use crate::parallel::parallel;
 use crate::sphere::Equirect;
 
 /// Titles of the columns of [`Quality::cells`].
@@ -76,6 +77,11 @@ pub(super) fn reconstruct(run: &Evaluation<'_>, codec: &dyn Codec) -> Result<Rec
 
 /// The codes alone.
 pub(super) fn codes(run: &Evaluation<'_>, codec: &dyn Codec) -> Result<Vec<Vec<f32>>> {
+    coding(run, codec).all(run)
+}
+
+/// Coding every panorama.
+pub(super) fn coding<'a>(run: &Evaluation<'a>, codec: &'a dyn Codec) -> Work<'a, Vec<f32>> {
     let (grid, items) = (run.data.grid(), run.data.items());
     let key = |(item, image): (&Item, serde_json::Value)| Key {
         protocol: "reconstruction",
@@ -84,7 +90,7 @@ pub(super) fn codes(run: &Evaluation<'_>, codec: &dyn Codec) -> Result<Vec<Vec<f
     };
     let keys: Vec<_> = items.iter().zip(images(run)).map(key).collect();
     let task = format!("{}, {}", codec.system(), codec.pass());
-    kept(run, ("panorama", &task), &keys, |i| codec.encode(grid, &items[i].log_radiance))
+    Work::new("panorama", task, keys, move |i| codec.encode(grid, &items[i].log_radiance))
 }
 
 /// Scores one reconstruction at exposure 0.

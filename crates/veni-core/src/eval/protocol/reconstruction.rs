@@ -3,8 +3,8 @@
 //! Each panorama is coded by each codec (a model's autoencoder pass: the posterior's mean; its optimised pass: a latent
 //! fitted from there; the bases given beside), decoded, and scored under both definitions of the metrics.
 
-use super::quality::{self, Reconstructed, reconstruct};
-use super::{Evaluation, Report};
+use super::quality::{self, Reconstructed, coding, reconstruct};
+use super::{Evaluation, Report, Share};
 use crate::Result;
 use crate::data::Item;
 use crate::eval::codec::Codec;
@@ -36,6 +36,23 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     means.note(run.optimised_note());
     (report.tables, report.details) = (vec![means], vec![each]);
     Ok(report)
+}
+
+/// The codes of a share of the panoramas.
+///
+/// # Errors
+/// As coding and writing fail.
+pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+    keep_models(run, share)?;
+    run.others.iter().try_for_each(|codec| coding(run, *codec).keep(run, share))
+}
+
+/// The models' own passes.
+pub(super) fn keep_models(run: &Evaluation<'_>, share: Share) -> Result<()> {
+    for subject in run.subjects {
+        run.codecs(subject).iter().try_for_each(|codec| coding(run, &**codec).keep(run, share))?;
+    }
+    Ok(())
 }
 
 /// Rows and a sheet of one system.

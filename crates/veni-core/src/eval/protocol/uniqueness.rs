@@ -8,8 +8,8 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::work::{images, kept};
-use super::{Evaluation, Report};
+use super::work::{Work, images};
+use super::{Evaluation, Report, Share};
 use crate::data::random::{Purpose, normal, stream};
 use crate::eval::figure::{Sheet, display, heat};
 use crate::eval::fitting::FitSettings;
@@ -65,7 +65,7 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     ];
     let mut each = Table::new("uniqueness-images", "Uniqueness of each panorama", &columns);
     for subject in run.subjects {
-        let pairs = pairs(run, subject)?;
+        let pairs = pairs(run, subject).all(run)?;
         let measured = measure(run, subject, &pairs, &mut report)?;
         for (item, m) in run.data.items().iter().zip(&measured) {
             let numbers = [m.midpoint[0], m.midpoint[1], m.fits[0], m.fits[1]].map(Cell::Scientific);
@@ -94,6 +94,14 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     Ok(report)
 }
 
+/// The fits of a share of the panoramas.
+///
+/// # Errors
+/// As fitting and writing fail.
+pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+    run.subjects.iter().try_for_each(|subject| pairs(run, subject).keep(run, share))
+}
+
 /// The authors' rates for the two kinds of models.
 fn fit(run: &Evaluation<'_>, subject: &Subject) -> FitSettings {
     let rates = match subject.kind() {
@@ -103,8 +111,9 @@ fn fit(run: &Evaluation<'_>, subject: &Subject) -> FitSettings {
     FitSettings::reference(run.data.grid(), rates, run.settings.quick)
 }
 
-fn pairs(run: &Evaluation<'_>, subject: &Subject) -> Result<Vec<Pair>> {
+fn pairs<'a>(run: &Evaluation<'a>, subject: &'a Subject) -> Work<'a, Pair> {
     let (grid, items, fit) = (run.data.grid(), run.data.items(), fit(run, subject));
+    let seed = run.settings.seed;
     let identities = images(run);
     let keys: Vec<_> = items
         .iter()
@@ -113,14 +122,13 @@ fn pairs(run: &Evaluation<'_>, subject: &Subject) -> Result<Vec<Pair>> {
             protocol: "uniqueness",
             name: format!("{}-{}", item.name(), subject.name()),
             decides: json!({
-                "model": subject.identity(), "fit": fit.key(), "seed": run.settings.seed, "image": image,
+                "model": subject.identity(), "fit": fit.key(), "seed": seed, "image": image,
             }),
         })
         .collect();
     let task = format!("{}, two fits", subject.name());
-    kept(run, ("panorama", &task), &keys, |i| {
-        let start =
-            [0, 1].map(|slot| random(subject.latent_vectors(), run.settings.seed, &identities[i], slot));
+    Work::new("panorama", task, keys, move |i| {
+        let start = [0, 1].map(|slot| random(subject.latent_vectors(), seed, &identities[i], slot));
         let fitted = fit.fit(subject, grid, &[items[i].log_radiance.as_slice(); 2], &start);
         let fitted = fitted.map_err(|e| Error::invalid(format!("{}: {e}", subject.name())))?;
         let mut vectors = fitted.latents.into_iter().map(|z| z.vectors);

@@ -1,13 +1,31 @@
 //! What a run says of itself: validation, previews, the model file.
 
+use std::borrow::Cow;
+
 use super::*;
 use crate::data::coarsen::{averaged, coarse_grid};
+use crate::data::random::{Purpose, stream};
+use crate::eval::metrics::Alignment;
+use crate::eval::reconstruction::Reconstruction;
 use crate::fit::{FitTarget, fit};
+use crate::latent::{Latent, Prior};
+use crate::model::{Model, ModelInfo, Training};
+use crate::output::Overwrite;
 use crate::sphere::Equirect;
 use crate::train::batch::Batches;
+use crate::train::init::InitConfig;
 use crate::train::latents::{self, LatentsConfig};
+use crate::train::preview;
 use crate::vae::veni::decode;
-use crate::vae::{LatentTable, Reni, Veni};
+use crate::vae::{Decoder, LatentTable, Reni, Veni};
+
+/// Panoramas in a preview.
+const PREVIEW_ROWS: usize = 8;
+/// Most panoramas that a prior is fitted to, and as many copies: it has N(N+1)/2 numbers, and encoding a large set would
+/// take longer than training on it.
+const PRIOR_PANORAMAS: usize = 2048;
+/// Panoramas that are encoded together for the prior; bounds the memory.
+const CHUNK: usize = 64;
 
 impl Trainer {
     /// The network that is validated and stored: averaged weights, no gradients.
@@ -19,8 +37,9 @@ impl Trainer {
 
     pub(super) fn validate(&mut self, log: &mut MetricsLog, progress: &mut dyn Progress) -> Result<()> {
         let network = self.averaged()?;
-        let subset = |set: &Dataset, most: usize| {
-            Dataset::new(set.grid(), set.items()[..most.min(set.len())].to_vec())
+        let subset = |set: &Dataset, most: usize| match set.items().get(..most) {
+            Some(first) => Dataset::new(set.grid(), first.to_vec()),
+            None => set.clone(),
         };
         let val = match &self.config.latents {
             Some(latents) => subset(&self.splits.val, latents.validation_panoramas),
@@ -76,18 +95,17 @@ impl Trainer {
     /// Writes `model.safetensors`; the prior is fitted to the training panoramas and `copies` augmented copies. With
     /// an auto-decoder also `latents.safetensors`.
     fn store(&self, network: &Network, copies: usize, step: u64, progress: &mut dyn Progress) -> Result<()> {
-        let prior = self.prior(network, copies)?;
-        let data: Vec<_> = self.config.data.folders.iter().filter_map(|f| f.file_name()).collect();
-        let data = data.iter().map(|f| f.to_string_lossy()).collect::<Vec<_>>().join(", ");
+        let (prior, latents) = self.prior(network, copies)?;
         let info = ModelInfo {
             training: Some(Training {
-                data: format!("{} panoramas of {data}", self.splits.train.len()),
+                data: self.describe_data(),
                 steps: step,
                 seed: self.config.seed,
                 command: self.command.clone(),
+                init: self.config.init.as_ref().map(InitConfig::describe),
                 ..Training::default()
             }),
-            prior: Some(format!("{} training latents", (1 + copies) * self.splits.train.len())),
+            prior: Some(format!("{latents} training latents")),
             ..ModelInfo::default()
         };
         let mut model = match network {
@@ -106,7 +124,23 @@ impl Trainer {
         Ok(())
     }
 
-    fn prior(&self, network: &Network, copies: usize) -> Result<Prior> {
+    /// The data in words: the panoramas of the run, then those of each stage that has its own.
+    fn describe_data(&self) -> String {
+        let names = |folders: &[PathBuf]| {
+            let names = folders.iter().filter_map(|folder| folder.file_name());
+            names.map(|name| name.to_string_lossy().into_owned()).collect::<Vec<_>>().join(", ")
+        };
+        let own = format!("{} panoramas of {}", self.splits.train.len(), names(&self.config.data.folders));
+        let stages = self.stages.iter().filter(|running| running.stage.own_data);
+        let stages = stages.map(|Running { stage, .. }| {
+            let name = stage.name.as_deref().unwrap_or_default();
+            format!("; {name}: {}", names(&stage.config.data.folders))
+        });
+        std::iter::once(own).chain(stages).collect()
+    }
+
+    /// The prior of the training panoramas, and the number of latents that it was fitted to.
+    fn prior(&self, network: &Network, copies: usize) -> Result<(Prior, usize)> {
         let (codes, variances) = match network {
             Network::Veni(veni) => self.encoded(veni, copies)?,
             Network::Reni(reni) => {
@@ -118,29 +152,36 @@ impl Trainer {
                 .unzip()
             }
         };
-        if codes.len() < 2 {
-            return Ok(Prior::standard(network.decoder().latent_vectors()));
-        }
-        Prior::fit(&codes, (!variances.is_empty()).then_some(variances.as_slice()))
+        let prior = match codes.len() {
+            0 | 1 => Prior::standard(network.decoder().latent_vectors()),
+            _ => Prior::fit(&codes, (!variances.is_empty()).then_some(variances.as_slice()))?,
+        };
+        Ok((prior, codes.len()))
     }
 
-    /// Latents and variances of the training panoramas and `copies` augmented copies of each.
+    /// Latents and variances of the training panoramas and `copies` augmented copies of each; of a large set of
+    /// [`PRIOR_PANORAMAS`], evenly spread.
     fn encoded(&self, veni: &Veni, copies: usize) -> Result<(Vec<Latent>, Vec<Vec<f32>>)> {
         let train = &self.splits.train;
         let batches = Batches::new(&self.config, veni.stripes()?, train);
+        let chosen = train.len().min(PRIOR_PANORAMAS);
+        let chosen: Vec<_> = (0..chosen).map(|at| at * train.len() / chosen).collect();
+        let copies = if train.len() > PRIOR_PANORAMAS { copies.min(1) } else { copies };
         let (mut codes, mut variances) = (Vec::new(), Vec::new());
         for copy in 0..=copies {
-            let images: Vec<_> = (train.items().iter().enumerate())
-                // slots beyond any batch: copies that no update has seen
-                .map(|(i, item)| match copy {
-                    0 => item.log_radiance.clone(),
-                    _ => batches.augmented(i, u64::MAX, (copy * train.len() + i) as u64),
-                })
-                .collect();
-            let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
-            for (encoded, item) in veni.encode(train.grid(), &views)?.into_iter().zip(train.items()) {
-                codes.push(Latent { log_exposure: item.log_exposure, ..Latent::new(encoded.vectors) });
-                variances.extend(encoded.variances);
+            for chosen in chosen.chunks(CHUNK) {
+                let image = |i: usize| match copy {
+                    0 => Cow::Borrowed(&train.items()[i].log_radiance),
+                    // slots beyond any batch: copies that no update has seen
+                    _ => Cow::Owned(batches.augmented(i, u64::MAX, (copy * train.len() + i) as u64)),
+                };
+                let images: Vec<_> = chosen.iter().map(|i| image(*i)).collect();
+                let views: Vec<_> = images.iter().map(|image| image.as_slice()).collect();
+                for (encoded, i) in veni.encode(train.grid(), &views)?.into_iter().zip(chosen) {
+                    let log_exposure = train.items()[*i].log_exposure;
+                    codes.push(Latent { log_exposure, ..Latent::new(encoded.vectors) });
+                    variances.extend(encoded.variances);
+                }
             }
         }
         Ok((codes, variances))
@@ -149,7 +190,7 @@ impl Trainer {
     pub(super) fn preview(&self, progress: &mut dyn Progress) -> Result<()> {
         let network = self.averaged()?;
         let step = self.steps_done();
-        let prior = self.prior(&network, 0)?;
+        let (prior, _) = self.prior(&network, 0)?;
         let (val, train) = (self.splits.val.items(), self.splits.train.items());
         // validation panoramas first: they say more; an auto-decoder has latents of the others only
         let known = matches!(network, Network::Reni(_));

@@ -1,0 +1,135 @@
+//! Everything that defines a training run, as stored in its `config.toml`.
+
+mod check;
+mod device;
+mod loss_grid;
+mod overrides;
+mod report;
+mod stage;
+#[cfg(test)]
+mod tests;
+
+use serde::{Deserialize, Serialize};
+
+pub use device::{DecoderBy, DeviceKind};
+pub use loss_grid::LossGrid;
+pub use report::{ReportConfig, Stored};
+pub use stage::{Stage, StageConfig};
+
+use crate::data::{AugmentConfig, DataConfig};
+use crate::model::ModelConfig;
+use crate::train::init::InitConfig;
+use crate::train::latents::LatentsConfig;
+use crate::train::loss::LossConfig;
+use crate::train::optimiser::AdamConfig;
+use crate::train::schedule::LearningRate;
+use crate::{Error, Result};
+
+/// A training run. Which system is trained is said by `model.kind`: the auto-encoder VENI, or the auto-decoder
+/// RENI++.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainConfig {
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Number of updates; with stages, of all of them together.
+    pub steps: u64,
+    /// Panoramas per step.
+    pub batch: usize,
+    /// Parts that a batch is computed in, one after the other, with their gradients averaged: the same step up to
+    /// rounding, in the memory of `batch / accumulate` panoramas.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub accumulate: usize,
+    /// How a batch is drawn.
+    pub order: Order,
+    /// Where gradients are computed.
+    pub device: DeviceKind,
+    /// What computes the decoder and its gradients.
+    #[serde(default)]
+    pub decoder_by: DecoderBy,
+    /// Decay of the averaged weights, which are validated and become the model; 0 takes the last weights.
+    pub ema_decay: f64,
+    /// The network.
+    pub model: ModelConfig,
+    /// The panoramas.
+    pub data: DataConfig,
+    /// Augmentation of training panoramas.
+    pub augment: AugmentConfig,
+    /// Which directions a step computes the losses on.
+    pub loss_grid: LossGrid,
+    /// Loss parts and their weights.
+    pub loss: LossConfig,
+    /// Optimiser of the decoder.
+    pub decoder: GroupConfig,
+    /// Optimiser of the encoder; absent with an auto-decoder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub encoder: Option<GroupConfig>,
+    /// The latent table of an auto-decoder; absent with an auto-encoder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub latents: Option<LatentsConfig>,
+    /// Validation, previews, checkpoints.
+    pub report: ReportConfig,
+    /// The model that the run begins with; absent: weights from the seed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub init: Option<InitConfig>,
+    /// Parts of the run with settings of their own; none: the run is one part.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stage: Vec<StageConfig>,
+}
+
+fn one() -> usize {
+    1
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_one(n: &usize) -> bool {
+    *n == 1
+}
+
+/// How a batch is drawn from the training panoramas.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Order {
+    /// Every panorama once per epoch, in a new order each time.
+    Shuffle,
+    /// Independently, with replacement (the authors').
+    Replacement,
+}
+
+/// Optimiser of one parameter group.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GroupConfig {
+    /// Learning rate over the updates; the first update is step 0.
+    pub learning_rate: LearningRate,
+    /// Adam's constants.
+    pub adam: AdamConfig,
+}
+
+impl TrainConfig {
+    /// Reads a `config.toml`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the key and line that do not fit.
+    pub fn from_toml(text: &str) -> Result<Self> {
+        let config: Self = toml::from_str(text).map_err(|e| Error::invalid(e.to_string()))?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// The text of `config.toml`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if a number has no TOML form.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string_pretty(self)
+            .map_err(|e| Error::invalid(format!("the configuration has no TOML form: {e}")))
+    }
+
+    /// Parameter groups, by the first part of their parameters' paths: `decoder`, and `encoder` or `latents`.
+    pub fn groups(&self) -> Vec<(&'static str, &GroupConfig)> {
+        let encoder = self.encoder.iter().map(|group| ("encoder", group));
+        let latents = self.latents.iter().map(|latents| ("latents", &latents.optimiser));
+        [("decoder", &self.decoder)].into_iter().chain(encoder).chain(latents).collect()
+    }
+}
