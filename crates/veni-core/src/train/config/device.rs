@@ -21,7 +21,7 @@ impl DeviceKind {
     /// The device, without gradient tracking.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] if it is not compiled in.
+    /// [`Error::Unsupported`](crate::Error::Unsupported) if it is not compiled in.
     pub fn device(self) -> Result<burn::tensor::Device> {
         match self {
             Self::Flex => Ok(burn::tensor::Device::flex()),
@@ -29,9 +29,9 @@ impl DeviceKind {
             #[allow(deprecated, reason = "kept and tested while burn ships it")]
             Self::Ndarray => Ok(burn::tensor::Device::ndarray()),
             #[cfg(not(feature = "ndarray"))]
-            Self::Ndarray => {
-                Err(Error::unsupported("device ndarray is not compiled in; build with --features ndarray"))
-            }
+            Self::Ndarray => Err(crate::Error::unsupported(
+                "device ndarray is not compiled in; build with --features ndarray",
+            )),
         }
     }
 }
