@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-#[cfg(not(feature = "ndarray"))]
-use crate::Error;
 use crate::Result;
 
 /// Where gradients are computed.
