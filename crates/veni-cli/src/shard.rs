@@ -47,7 +47,7 @@ impl Shard {
     /// Says, if it is so, that there are fewer inputs than processes.
     pub(crate) fn note_idle(self, inputs: usize, report: Report) {
         if self.part.is_some_and(|part| part.number > inputs) {
-            report.note(format_args!("--shard {self}: nothing to do, there are {inputs} inputs"));
+            report.note(format_args!("--shard {self}: nothing to do, with so few inputs ({inputs})"));
         }
     }
 }

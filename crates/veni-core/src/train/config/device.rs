@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-#[cfg(not(feature = "ndarray"))]
-use crate::Error;
 use crate::Result;
 
 /// What computes the decoder and its gradients in training: the same numbers up to rounding.
@@ -33,7 +31,7 @@ impl DeviceKind {
     /// The device, without gradient tracking.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] if it is not compiled in.
+    /// [`Error::Unsupported`](crate::Error::Unsupported) if it is not compiled in.
     pub fn device(self) -> Result<burn::tensor::Device> {
         match self {
             Self::Flex => Ok(burn::tensor::Device::flex()),
@@ -41,9 +39,9 @@ impl DeviceKind {
             #[allow(deprecated, reason = "kept and tested while burn ships it")]
             Self::Ndarray => Ok(burn::tensor::Device::ndarray()),
             #[cfg(not(feature = "ndarray"))]
-            Self::Ndarray => {
-                Err(Error::unsupported("device ndarray is not compiled in; build with --features ndarray"))
-            }
+            Self::Ndarray => Err(crate::Error::unsupported(
+                "device ndarray is not compiled in; build with --features ndarray",
+            )),
         }
     }
 }
