@@ -9,6 +9,7 @@ mod fit;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod inspect;
+mod prepare;
 mod readers;
 mod render_probe;
 mod training;
