@@ -197,7 +197,7 @@ fn runs_go_on_where_they_stopped_and_take_in_what_is_new() {
     assert_eq!(images("parts"), images("whole"), "to the byte");
 
     // a source that changes is examined again, an image that was lost is made again
-    let lost = dir.path("whole").join(&images("whole").keys().next().unwrap());
+    let lost = dir.path("whole").join(images("whole").keys().next().unwrap());
     std::fs::remove_file(&lost).unwrap();
     std::fs::copy(original("kloppenheim_05"), dir.path("in/snow.png")).unwrap();
     let run = dir.run(&["prepare", "in", "-o", "whole"]);

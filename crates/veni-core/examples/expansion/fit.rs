@@ -33,15 +33,6 @@ pub(crate) fn run(folder: &str) -> Result<(), Failure> {
         let (Region { solid_angle, features, centre, .. }, [r, g, b]) = (&regions[chosen], energies[chosen]);
         let mean = (0.2126 * r + 0.7152 * g + 0.0722 * b) / solid_angle;
         sun.add(features, mean.ln(), 1.0);
-        if std::env::var_os("DUMP").is_some() {
-            eprintln!(
-                "{:40} {:+} {:.2} {:?}",
-                sample.name,
-                sample.stops,
-                mean.ln(),
-                features.map(|f| (f * 100.0).round() / 100.0)
-            );
-        }
         if mean > SUNNY {
             let row = [1.0, f64::from(centre[2])];
             red.add(&row, (r / g).ln(), 1.0);

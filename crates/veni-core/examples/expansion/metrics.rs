@@ -93,7 +93,7 @@ pub(crate) fn run(folder: &str, train: Option<&str>) -> Result<(), Failure> {
     println!("|---|---|---|---|---|---|---|---|");
     let mut every: Vec<Vec<Errors>> = methods.iter().map(|_| Vec::new()).collect();
     for stops in STOPS {
-        let samples: Vec<_> = panoramas.iter().map(|(n, p)| Sample::new(n, p, stops)).collect();
+        let samples: Vec<_> = panoramas.iter().map(|(_, p)| Sample::new(p, stops)).collect();
         for (method, every) in methods.iter().zip(&mut every) {
             let errors: Vec<_> = samples.iter().map(|s| Errors::new(&s.truth, &(method.run)(s))).collect();
             row(&format!("{stops:+}"), &method.name, &errors);

@@ -17,7 +17,7 @@ pub(crate) fn landis(linear: &Panorama, brightest: f32) -> Panorama {
 }
 
 /// F. Banterle et al., "Inverse tone mapping" (GRAPHITE 2006): the inverse of Reinhard's photographic operator, blended in by
-/// an expand map. Here the map is the depth in clipped regions (0 at their border, 1 innermost) in place of the
+/// an expand map. Here the map is the depth in clipped regions (0 at their border, near 1 innermost) in place of the
 /// density of sampled lights. `white` is what the operator maps to 1, and with it the brightest value.
 pub(crate) fn banterle(analysis: &Analysis, white: f32) -> Panorama {
     let mut out = analysis.linear().clone();

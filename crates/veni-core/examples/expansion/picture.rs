@@ -23,7 +23,7 @@ pub(crate) fn run(out: &str, inputs: &[&str]) -> Result<(), Failure> {
         image::RgbImage::from_pixel(u32::try_from(width)?, u32::try_from(height)?, image::Rgb([24; 3]));
     for (row, input) in inputs.iter().enumerate() {
         let (name, panorama) = read_file(Path::new(input))?;
-        let sample = Sample::new(&name, &panorama, 0.0);
+        let sample = Sample::new(&panorama, 0.0);
         let linear = sample.ldr.linear(Transfer::Srgb);
         let expanded = sample.ldr.expand(&ExpandOptions::default());
         eprintln!("{name}: {:.1} % clipped, {:?}", 100.0 * expanded.clipped, expanded.sun);

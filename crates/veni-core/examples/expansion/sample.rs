@@ -12,8 +12,6 @@ pub(crate) const STOPS: [f32; 4] = [-1.0, 0.0, 1.0, 2.0];
 
 /// A panorama at one exposure: 1 is the display's white.
 pub(crate) struct Sample {
-    pub(crate) name: String,
-    pub(crate) stops: f32,
     pub(crate) truth: Panorama,
     pub(crate) ldr: LdrPanorama,
 }
@@ -35,16 +33,16 @@ pub(crate) fn read_file(file: &Path) -> Result<(String, Panorama), Failure> {
 
 impl Sample {
     /// Exposes, clips and quantises.
-    pub(crate) fn new(name: &str, panorama: &Panorama, stops: f32) -> Self {
+    pub(crate) fn new(panorama: &Panorama, stops: f32) -> Self {
         let mut truth = panorama.clone();
         truth.scale(MIDDLE_GREY / panorama.mean_log_luminance().exp() * stops.exp2());
         let code = |v: f32| (srgb(v.clamp(0.0, 1.0)) * 255.0).round() / 255.0;
         let ldr = LdrPanorama::new(truth.grid(), truth.pixels().iter().map(|p| p.map(code)).collect());
-        Self { name: name.to_owned(), stops, truth, ldr }
+        Self { truth, ldr }
     }
 
     /// All exposures of all panoramas.
     pub(crate) fn all(panoramas: &[(String, Panorama)]) -> impl Iterator<Item = Self> {
-        panoramas.iter().flat_map(|(name, p)| STOPS.map(|stops| Self::new(name, p, stops)))
+        panoramas.iter().flat_map(|(_, p)| STOPS.map(|stops| Self::new(p, stops)))
     }
 }

@@ -58,8 +58,7 @@ pub fn capture(path: &Path) -> String {
 
 /// The name without what does not tell captures apart.
 fn strip(lower: &str) -> String {
-    let mut words: Vec<&str> =
-        lower.split(|c: char| c == '_' || c == ' ' || c == '.' || c == '(' || c == ')').collect();
+    let mut words: Vec<&str> = lower.split(['_', ' ', '.', '(', ')']).collect();
     // a hyphen divides words too, but belongs to the exposure in `ev-2`
     words = words.iter().flat_map(|word| split_hyphens(word)).filter(|w| !w.is_empty()).collect();
     while words.len() > 1 && words.last().is_some_and(|w| is_variant(w)) {

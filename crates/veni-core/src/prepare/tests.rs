@@ -99,7 +99,7 @@ fn what_is_unfit_is_refused_and_says_why() {
         read: ReadOptions::default(),
     };
     let good = panoramas().swap_remove(0);
-    let write = |name: &str, change: &dyn Fn(usize, f32) -> f32| {
+    let write = |name: &str, change: fn(usize, f32) -> f32| {
         let path = folder.path().join(name);
         let (width, height) = (good.grid().width, good.grid().height);
         exr::prelude::write_rgb_file(&path, width, height, |x, y| {
@@ -109,20 +109,18 @@ fn what_is_unfit_is_refused_and_says_why() {
         .unwrap();
         examine(&path, &config)
     };
-    let fine = write("good.exr", &|_, v| v).unwrap();
+    let fine = write("good.exr", |_, v| v).unwrap();
     assert_eq!((fine.panorama.grid(), fine.size, fine.replaced.total()), (config.grid, good.grid(), 0));
     assert!(fine.expanded.is_none() && fine.stops > 1.0);
-    let patched = write("patched.exr", &|k, v| if k % 50 == 0 { f32::NAN } else { v }).unwrap();
+    let patched = write("patched.exr", |k, v| if k % 50 == 0 { f32::NAN } else { v }).unwrap();
     assert!(patched.replaced.nan > 100 && patched.panorama.pixels().iter().flatten().all(|v| v.is_finite()));
-    for (name, words, change) in [
-        (
-            "nan.exr",
-            "not numbers",
-            &(|k, v| if k % 10 == 0 { f32::NAN } else { v }) as &dyn Fn(usize, f32) -> f32,
-        ),
-        ("black.exr", "black", &|k, v| if k % 8 < 5 { 0.0 } else { v }),
-        ("grey.exr", "same value", &|_, _| 0.5),
-    ] {
+    type Change = fn(usize, f32) -> f32;
+    let cases: [(&str, &str, Change); 3] = [
+        ("nan.exr", "not numbers", |k, v| if k % 10 == 0 { f32::NAN } else { v }),
+        ("black.exr", "black", |k, v| if k % 8 < 5 { 0.0 } else { v }),
+        ("grey.exr", "same value", |_, _| 0.5),
+    ];
+    for (name, words, change) in cases {
         let error = write(name, change).unwrap_err().to_string();
         assert!(error.contains(name) && error.contains(words), "{error}");
     }

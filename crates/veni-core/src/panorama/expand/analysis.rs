@@ -26,8 +26,7 @@ impl Analysis {
         let any: Vec<bool> = flags.iter().map(|f| f.contains(&true)).collect();
         let all: Vec<bool> = flags.iter().map(|f| !f.contains(&false)).collect();
         let clipped = (any.iter().enumerate().filter(|(_, clipped)| **clipped))
-            .map(|(k, _)| grid.solid_angle(k / grid.width))
-            .sum::<f64>()
+            .fold(0.0, |sum, (k, _)| sum + grid.solid_angle(k / grid.width))
             / (4.0 * std::f64::consts::PI);
         if !any.contains(&true) {
             return Self { linear, regions: vec![], labels: vec![], nearest: vec![], shape: vec![], clipped };
@@ -55,8 +54,8 @@ impl Analysis {
         self.clipped
     }
 
-    /// The pixels that are clipped in all channels: index, region, and x = −ln max(1 − d/R, r☉/R), so that
-    /// the expand map is eᵖˣ.
+    /// The pixels that are clipped in all channels: index, region, and x of the [module](super), so that the expand map
+    /// is eᵖˣ.
     pub fn pixels(&self) -> impl Iterator<Item = (usize, usize, f32)> {
         let inside = self.labels.iter().enumerate().filter(|(_, label)| **label != OUTSIDE);
         inside.map(|(k, label)| (k, *label as usize, self.shape[k]))

@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 use super::SUN_RADIUS;
 use super::nearest::{Angles, NOWHERE, nearest_outside};
 use super::regions::OUTSIDE;
-use crate::panorama::{LOG_FLOOR, Panorama, luminance};
+use super::scene::Scene;
+use crate::panorama::Panorama;
 
 /// Number of [`Region::features`].
 pub const FEATURES: usize = 8;
@@ -22,12 +23,15 @@ pub struct Region {
     pub radius: f64,
     /// Unit vector to the innermost point.
     pub centre: [f32; 3],
-    /// What the brightness is predicted from: 1; ln of the solid angle; sine of the centre's elevation; ln of the
-    /// solid angle over that of a disc of radius R (0 for a disc, more for ragged regions); mean ln luminance of
-    /// the panorama; mean ln luminance of a ring around the region, as wide as R; ln of its share of all that is
-    /// clipped; mean ln(blue/red) of the ring.
+    /// What the brightness is predicted from. 0: 1. Of the region: 1: ln of the solid angle over that of a disc of radius R
+    /// (0 for a disc, more for ragged regions); 2: squared sine of the centre's elevation; 3 and 4: mean ln(blue/red)
+    /// of a ring around it, as wide as R, and its square. Of the whole panorama: 5: how much brighter the ground is than
+    /// what is seen of the sky makes it; 6: how deep its shadows are; 7: ln of the irradiance of a surface that faces up.
     pub features: [f64; FEATURES],
 }
+
+/// The depth in which the expand map has risen to its shoulder, radians; chosen with the fit.
+const SHOULDER: f64 = 0.02;
 
 /// Sums over the pixels of one region or of the ring around it.
 #[derive(Clone, Copy, Default)]
@@ -36,7 +40,6 @@ struct Sums {
     deepest: f64,
     centre: [f64; 3],
     ring: f64,
-    ring_log: f64,
     ring_hue: f64,
 }
 
@@ -69,16 +72,16 @@ pub(super) fn describe(
     for &(pixel, region, depth) in &inside {
         let sum = &mut sums[region];
         let radius = sum.deepest + half;
-        shape[pixel] = -(1.0 - depth / radius).max(SUN_RADIUS / radius).min(1.0).ln() as f32;
+        let left = (1.0 - depth / radius).max(SUN_RADIUS / radius).min(1.0);
+        shape[pixel] = (1.0 - (-depth / SHOULDER).exp() - left.ln()) as f32;
         if depth >= sum.deepest - 0.5 * half {
             let direction = grid.direction(pixel % grid.width, pixel / grid.width);
             sum.centre.iter_mut().zip(direction).for_each(|(c, d)| *c += weight(pixel) * f64::from(d));
         }
     }
     add_rings(angles, linear, labels, &mut sums);
-    let total: f64 = sums.iter().map(|s| s.solid_angle).sum();
-    let key = f64::from(linear.mean_log_luminance());
-    let regions = sums.iter().map(|sum| sum.region(half, total, key)).collect();
+    let scene = Scene::new(linear, labels);
+    let regions = sums.iter().map(|sum| sum.region(half, scene)).collect();
     (regions, shape)
 }
 
@@ -95,30 +98,29 @@ fn add_rings(angles: &Angles, linear: &Panorama, labels: &[u32], sums: &mut [Sum
         if angles.between(pixel as u32, region) > sum.deepest.max(RING) {
             continue;
         }
-        let [r, g, b] = linear.pixels()[pixel];
+        let [r, _, b] = linear.pixels()[pixel];
         let weight = grid.solid_angle(pixel / grid.width);
         sum.ring += weight;
-        sum.ring_log += weight * f64::from(luminance([r, g, b]).max(LOG_FLOOR)).ln();
         sum.ring_hue += weight * f64::from((b + 1e-3) / (r + 1e-3)).ln();
     }
 }
 
 impl Sums {
-    fn region(&self, half: f64, total: f64, key: f64) -> Region {
+    fn region(&self, half: f64, scene: Scene) -> Region {
         let radius = self.deepest + half;
         let disc = 2.0 * PI * (1.0 - radius.cos());
         let length = self.centre.iter().map(|c| c * c).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
         let centre = self.centre.map(|c| (c / length) as f32);
-        let ring = self.ring.max(f64::MIN_POSITIVE);
+        let hue = self.ring_hue / self.ring.max(f64::MIN_POSITIVE);
         let features = [
             1.0,
-            self.solid_angle.ln(),
-            f64::from(centre[2]),
             (self.solid_angle / disc).ln(),
-            key,
-            self.ring_log / ring,
-            (self.solid_angle / total).ln(),
-            self.ring_hue / ring,
+            f64::from(centre[2]).powi(2),
+            hue,
+            hue * hue,
+            scene.balance,
+            scene.shadows,
+            scene.irradiance,
         ];
         Region { solid_angle: self.solid_angle, radius, centre, features }
     }

@@ -30,7 +30,13 @@ const BRIGHTEST: f64 = 1e5;
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self { exponent: [0.0; FEATURES], sun: [0.0; FEATURES], red: [0.0; 2], blue: [0.0; 2], faintest: 0.1 }
+        Self {
+            exponent: [0.4124, 0.0359, 0.3278, -0.2130, 0.3144, 0.1731, 0.1088, -0.2365],
+            sun: [0.6803, -0.0872, 1.2012, -0.0443, 0.7584, 1.0511, 1.0688, -0.7532],
+            red: [0.2453, -0.3382],
+            blue: [-0.5239, 0.6943],
+            faintest: 0.1,
+        }
     }
 }
 

@@ -6,10 +6,10 @@
 //!    the channels left tell (the idea of Zhang and Brainard, "Estimation of saturated pixel values in digital
 //!    color imaging", JOSA A 21(12), 2004). Blue is the first channel to go in a sky.
 //! 2. **Regions clipped in all channels** are given an expand map (Banterle et al., "Inverse tone mapping", GRAPHITE
-//!    2006; as in Rempel et al., "Ldr2Hdr", SIGGRAPH 2007, it grows smoothly from the region's border, where it is 1). Here
-//!    it is a power law of the depth: with d the angle to the border, R the greatest depth and r☉ the sun's radius,
-//!    L = max(1 − d/R, r☉/R)⁻ᵖ, which for a disc is the (R/r)ᵖ of an aureole. The exponent p is a linear
-//!    function of what is known of the region ([`Region::features`]).
+//!    2006; as in Rempel et al., "Ldr2Hdr", SIGGRAPH 2007, it grows smoothly from the region's border, where it is 1).
+//!    Here it is a power of the depth: with d the angle to the border, R the greatest depth and r☉ the sun's radius,
+//!    ln L = p x, x = 1 − e^(−d/δ) − ln max(1 − d/R, r☉/R): a shoulder of δ = 0.02 and, for a disc, the (R/r)ᵖ of an
+//!    aureole. The exponent p is a linear function of what is known of the region ([`Region::features`]).
 //! 3. **The sun**, or whatever shines in the region that reaches deepest above the horizon: its whole energy is predicted by
 //!    a second linear function of the same features, and what the map leaves of it becomes a disc of the sun's size.
 //!
@@ -23,6 +23,7 @@ mod fitted;
 mod nearest;
 mod rebuild;
 mod regions;
+mod scene;
 #[cfg(test)]
 mod tests;
 
