@@ -46,7 +46,7 @@ pub struct Likeness {
 
 impl Likeness {
     /// The least [`Likeness::around`] of a near-duplicate.
-    pub const AROUND: f32 = 0.95;
+    pub const AROUND: f32 = 0.93;
     /// The least [`Likeness::whole`] of a near-duplicate.
     pub const WHOLE: f32 = 0.95;
 }

@@ -1,5 +1,6 @@
 //! Panoramas of limited range: PNG, JPEG and WebP, as the display values that are stored.
 
+use std::io::{Read, Seek};
 use std::path::Path;
 
 use image::metadata::Orientation;
@@ -126,6 +127,9 @@ fn decode(path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
         ImageError::Unsupported(e) => Error::unsupported(format!("{name}: {e}")),
         other => Error::invalid(format!("damaged or truncated {name} file: {other}")),
     };
+    if format == ImageFormat::Jpeg && !jpeg_ends(&mut file).map_err(|e| Error::io(path, "read", e))? {
+        return Err(Error::invalid("truncated JPEG file"));
+    }
     let mut reader = ImageReader::with_format(file, format);
     let mut limits = Limits::default();
     // 8 bytes of the largest sample layout per pixel, and as much again for a decoder's own buffers
@@ -139,6 +143,24 @@ fn decode(path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
     let mut image = DynamicImage::from_decoder(decoder).map_err(wrap)?;
     image.apply_orientation(orientation);
     Ok(values(grid, &image))
+}
+
+/// Whether a JPEG stream has an end marker behind the start of its first scan; the decoder paints what is missing grey.
+/// Rewinds.
+fn jpeg_ends(file: &mut (impl Read + Seek)) -> std::io::Result<bool> {
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    file.rewind()?;
+    // segments before the scan are stepped over: thumbnails in them have an end of their own
+    let mut at = 2;
+    while let Some(&[0xFF, marker, high, low]) = bytes.get(at..at + 4) {
+        if marker == 0xDA {
+            return Ok(bytes[at..].windows(2).any(|pair| pair == [0xFF, 0xD9]));
+        }
+        at += 2 + usize::from(u16::from_be_bytes([high, low]));
+    }
+    // fill bytes or no scan at all: for the decoder to judge
+    Ok(true)
 }
 
 /// Whether turning the image upright exchanges its sides.
