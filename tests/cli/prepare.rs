@@ -148,7 +148,7 @@ fn a_dirty_folder_becomes_a_training_set() {
     let after = contents(&dir, "data");
     let again = dir.run(&["prepare", "in", "-o", "data", "--val", "0.2", "--seed", "1"]);
     assert!(
-        again.code == Some(1) && again.err.contains("17 of 17 files were examined before"),
+        again.code == Some(1) && again.err.contains("18 of 18 files were examined before"),
         "{}",
         again.err
     );

@@ -76,7 +76,7 @@ pub(crate) fn run(folder: &str, train: Option<&str>) -> Result<(), Failure> {
     let mut methods = vec![Method::new("linearised", |s| s.ldr.linear(Transfer::Srgb))];
     if let Some(train) = train {
         let train = read(train)?;
-        let whites = [2.0, 4.0, 8.0, 16.0, 32.0];
+        let whites = [1.5, 2.0, 3.0, 4.0, 8.0, 16.0];
         methods.push(best(whites.map(Method::landis).into(), &train));
         methods.push(best(whites.map(Method::banterle).into(), &train));
     }
@@ -101,14 +101,15 @@ pub(crate) fn run(folder: &str, train: Option<&str>) -> Result<(), Failure> {
         }
     }
     methods.iter().zip(&every).for_each(|(method, errors)| row("all", &method.name, errors));
-    if std::env::var_os("EACH").is_some() {
-        for (k, (name, _)) in panoramas.iter().enumerate() {
-            for (s, stops) in STOPS.iter().enumerate() {
-                let at = s * panoramas.len() + k;
-                let (plain, ours) = (&every[0][at], &every[every.len() - 1][at]);
-                println!("{name} {stops:+}: {plain:.2?} -> {ours:.2?}");
-            }
-        }
+    println!("\nWhere the truth is above white, |ln(energy / true energy)|, linearised → expanded:\n");
+    println!("| panorama |{}", STOPS.map(|s| format!(" {s:+} |")).concat());
+    println!("|---|{}", "---|".repeat(STOPS.len()));
+    for (k, (name, _)) in panoramas.iter().enumerate() {
+        let cell = |(s, _): (usize, &f32)| {
+            let at = s * panoramas.len() + k;
+            format!(" {:.2} → {:.2} |", every[0][at].energy, every[every.len() - 1][at].energy)
+        };
+        println!("| {name} |{}", STOPS.iter().enumerate().map(cell).collect::<String>());
     }
     Ok(())
 }

@@ -10,7 +10,7 @@ use veni_core::sphere::Equirect;
 use crate::Failure;
 use crate::sample::{Sample, read_file};
 
-const CELL: Equirect = Equirect { width: 256, height: 128 };
+const CELL: Equirect = Equirect { width: 192, height: 96 };
 const GAP: usize = 4;
 /// How much darker the highlights are shown.
 const DARKER: f32 = -4.0;

@@ -7,7 +7,7 @@
 //! | `images/ID.exr` | prepared images that are not placed yet |
 //! | `plan.json` | where each image is, or is being moved: former places, then the wanted one |
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -194,6 +194,13 @@ impl Store {
             places.push(place.clone());
         }
         self.write_plan(both)?;
+        // an image made anew waits while its former self is still in place
+        let owned: BTreeSet<PathBuf> = self.plan.keys().filter_map(|id| self.image(id)).collect();
+        for (_, places) in self.plan.iter().filter(|(id, _)| self.waiting(id).is_file()) {
+            for former in places.iter().map(|place| self.root.join(place)).filter(|p| !owned.contains(p)) {
+                remove(&former)?;
+            }
+        }
         // first out of the way, then into place: names may be exchanged
         for id in self.plan.keys() {
             let Some(now) = self.image(id) else { continue };
