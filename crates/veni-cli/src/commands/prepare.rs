@@ -36,7 +36,8 @@ use store::{Settings, Store};
         street_01_puresky are one capture; numbers of three digits or more are captures of their own) and by content \
         (near-duplicates at another exposure, turned about the vertical or mirrored). The side follows from --seed and the \
         capture's name alone. Files inside folders named train, val or test keep their side, unless a near-duplicate is held out.\n\n\
-        Stopped half-way, the same command goes on where it was; run again, it takes in only what is new or changed.",
+        Stopped half-way, the same command goes on where it was; run again, it takes in only what is new or changed. \
+        --force begins anew and removes what an earlier run wrote into DIR, nothing else.",
     after_help = "Exit code 1: ready, but some files were refused.\n\n\
         Examples:\n  \
         veni-cli prepare panoramas/ -o data && veni-cli train --data data --out run\n  \
@@ -80,7 +81,6 @@ pub(crate) struct Prepare {
     #[arg(long, value_name = "G", value_parser = gamma)]
     gamma: Option<f32>,
 
-    /// Begin anew: remove what an earlier run wrote into DIR
     #[command(flatten)]
     force: Force,
 }

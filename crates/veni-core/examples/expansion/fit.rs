@@ -104,9 +104,8 @@ fn gauss<const N: usize>(mut a: [[f64; N]; N], mut b: [f64; N]) -> [f64; N] {
         b.swap(k, pivot);
         for i in k + 1..N {
             let factor = a[i][k] / a[k][k];
-            for j in k..N {
-                a[i][j] -= factor * a[k][j];
-            }
+            let pivot = a[k];
+            a[i].iter_mut().zip(pivot).for_each(|(v, p)| *v -= factor * p);
             b[i] -= factor * b[k];
         }
     }

@@ -9,6 +9,8 @@
 //! coded in 8-bit sRGB, expanded, and compared with what it was. `measure` tables the expansion beside plain linearisation
 //! and two published operators, whose free parameters are chosen on TRAIN_DIR.
 
+#![expect(clippy::print_stdout, reason = "an example that prints tables")]
+
 mod fit;
 mod metrics;
 mod operators;

@@ -159,7 +159,7 @@ fn markdown(
             format!(
                 "{first} and {second}: correlation {:.3}, turned by {:.0}°{mirrored}",
                 l.around,
-                l.turn.to_degrees()
+                l.turn.to_degrees().round() + 0.0
             )
         }),
     )?;
