@@ -57,6 +57,7 @@ fn completions_and_manual_pages_know_every_command() {
         "encode",
         "evaluate",
         "fit",
+        "prepare",
         "render-probe",
         "inspect",
         "bench",

@@ -10,6 +10,7 @@ mod fit;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod inspect;
+mod prepare;
 mod readers;
 mod render_probe;
 mod shards;

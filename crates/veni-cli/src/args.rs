@@ -48,6 +48,7 @@ pub(crate) enum Command {
     Encode(commands::encode::Encode),
     #[cfg(feature = "learn")]
     Fit(commands::fit::Fit),
+    Prepare(commands::prepare::Prepare),
     RenderProbe(commands::render_probe::RenderProbe),
     #[cfg(feature = "learn")]
     Evaluate(commands::evaluate::Evaluate),

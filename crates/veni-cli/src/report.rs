@@ -11,13 +11,6 @@ pub(crate) enum Outcome {
     /// It did what was asked (exit code 0).
     Fine,
     /// It ran, but the answer is no, or it was stopped on request (exit code 1).
-    #[cfg_attr(
-        not(any(feature = "gpu", feature = "learn")),
-        expect(
-            dead_code,
-            reason = "only checks of devices say no, and only training can be stopped half-way"
-        )
-    )]
     Negative,
 }
 

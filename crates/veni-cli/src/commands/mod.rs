@@ -11,6 +11,7 @@ pub(crate) mod evaluate;
 pub(crate) mod fit;
 pub(crate) mod inspect;
 pub(crate) mod man;
+pub(crate) mod prepare;
 pub(crate) mod render_probe;
 pub(crate) mod sample;
 #[cfg(feature = "learn")]
@@ -30,6 +31,7 @@ pub(crate) fn run(command: Command, report: Report) -> Result<Outcome> {
         Command::Encode(c) => c.run(report),
         #[cfg(feature = "learn")]
         Command::Fit(c) => c.run(report),
+        Command::Prepare(c) => c.run(report),
         Command::RenderProbe(c) => c.run(report),
         #[cfg(feature = "learn")]
         Command::Evaluate(c) => c.run(report),

@@ -7,6 +7,7 @@
 //! | step | here |
 //! |---|---|
 //! | OpenEXR and Radiance `.hdr` files | [`Panorama::read`], [`Panorama::read_with`], [`attributes`] |
+//! | PNG, JPEG, WebP, and radiance from them | [`LdrPanorama`], [`expand`] |
 //! | NaN, infinite, negative values | [`Panorama::sanitise`] |
 //! | other sizes, turned, mirrored | [`Panorama::resample`], [`Panorama::turn`], [`Panorama::mirror`] |
 //! | what the model works on | [`Panorama::log`], [`Panorama::mean_log_luminance`] |
@@ -14,6 +15,7 @@
 //! | EXR, `.hdr`, PNG files, whole or row by row | [`Panorama::write`], [`write_rows`] |
 
 mod colour;
+pub mod expand;
 mod read;
 mod resample;
 mod sanitise;
@@ -28,7 +30,7 @@ use std::collections::BTreeMap;
 use crate::sphere::Equirect;
 
 pub use colour::luminance;
-pub use read::{DEFAULT_MAX_PIXELS, ReadOptions, attributes};
+pub use read::{DEFAULT_MAX_PIXELS, LdrPanorama, ReadOptions, Transfer, attributes};
 pub use sanitise::{LOG_FLOOR, Sanitised, log_reference, sanitise_values};
 pub use write::{HalfRange, Precision, RADIANCE_SCALE, RowSink, WriteFormat, WriteOptions, write_rows};
 

@@ -2,15 +2,22 @@
 
 mod exr;
 mod hdr;
+mod ldr;
+#[cfg(test)]
+mod ldr_tests;
 
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
+use image::ImageFormat;
+
 use super::Panorama;
 use crate::sphere::Equirect;
 use crate::{Error, Result};
+
+pub use ldr::{LdrPanorama, Transfer};
 
 /// The largest panorama that [`Panorama::read`] accepts: 2²⁸ pixels (a little over 23,000 × 11,500), which is
 /// 3 GiB of radiance. [`ReadOptions::max_pixels`] overrides it.
@@ -140,36 +147,58 @@ enum Kind {
     Hdr { strict: bool },
 }
 
-/// Formats that hold no radiance, by their first bytes.
-const LIMITED_RANGE: [(&[u8], &str); 7] = [
-    (b"\x89PNG", "PNG"),
-    (b"\xFF\xD8\xFF", "JPEG"),
-    (b"RIFF", "WebP"),
-    (b"BM", "BMP"),
-    (b"GIF8", "GIF"),
-    (b"II*\0", "TIFF"),
-    (b"MM\0*", "TIFF"),
+/// Formats of limited range that [`LdrPanorama::read`] reads, by their first bytes.
+const LDR: [(&[u8], ImageFormat, &str); 3] = [
+    (b"\x89PNG", ImageFormat::Png, "PNG"),
+    (b"\xFF\xD8\xFF", ImageFormat::Jpeg, "JPEG"),
+    (b"RIFF", ImageFormat::WebP, "WebP"),
 ];
 
-/// Recognises the format and rewinds.
-fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
+/// Formats that nothing here reads: where the name of each stands, and what to convert it to.
+const FOREIGN: [(usize, &[u8], &str); 7] = [
+    (4, b"ftypavif", "AVIF"),
+    (4, b"ftypavis", "AVIF"),
+    (4, b"ftypheic", "HEIF"),
+    (0, b"BM", "BMP"),
+    (0, b"GIF8", "GIF"),
+    (0, b"II*\0", "TIFF"),
+    (0, b"MM\0*", "TIFF"),
+];
+
+/// The first bytes of a file, which tell its format; rewinds.
+fn first_bytes(file: &mut (impl Read + Seek), path: &Path) -> Result<Vec<u8>> {
     let mut start = Vec::new();
     file.take(16).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
     file.rewind().map_err(|e| Error::io(path, "read", e))?;
+    Ok(start)
+}
+
+/// Recognises a format that holds radiance and rewinds.
+fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
+    let start = first_bytes(file, path)?;
     if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
         return Ok(Kind::Exr);
     }
     if start.starts_with(b"#?") {
         return Ok(Kind::Hdr { strict: start.starts_with(b"#?RADIANCE") });
     }
-    if let Some((_, name)) = LIMITED_RANGE.iter().find(|(magic, _)| start.starts_with(magic)) {
+    if let Some((_, _, name)) = LDR.iter().find(|(magic, ..)| start.starts_with(magic)) {
         return Err(Error::unsupported(format!(
             "{name} holds no high dynamic range; `veni-cli prepare` expands such panoramas into EXR files first"
         )));
     }
-    Err(if start.is_empty() {
-        Error::invalid("the file is empty")
-    } else {
-        Error::unsupported("neither an OpenEXR nor a Radiance .hdr file")
-    })
+    Err(unknown(&start, "neither an OpenEXR nor a Radiance .hdr file"))
+}
+
+/// The error for content that is none of the formats looked for.
+fn unknown(start: &[u8], otherwise: &str) -> Error {
+    if start.is_empty() {
+        return Error::invalid("the file is empty");
+    }
+    match FOREIGN.iter().find(|(at, magic, _)| start.get(*at..).is_some_and(|s| s.starts_with(magic))) {
+        Some((.., name)) => Error::unsupported(format!(
+            "{name} images are not read; convert it to EXR, or to PNG if it holds no high dynamic range"
+        )),
+        None => Error::unsupported(otherwise),
+    }
 }

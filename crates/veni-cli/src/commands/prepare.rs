@@ -1,0 +1,137 @@
+//! `veni-cli prepare`: any pile of panoramas to a checked training folder.
+
+mod contact;
+mod place;
+mod record;
+mod report;
+mod scan;
+mod store;
+mod work;
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::{Args, ValueEnum};
+use veni_core::panorama::expand::ExpandOptions;
+use veni_core::panorama::{ReadOptions, Transfer};
+use veni_core::prepare::{PrepareConfig, Shares};
+use veni_core::sphere::Equirect;
+
+use crate::args::Force;
+use crate::report::{Outcome, Report};
+use crate::size::Size;
+use place::Placing;
+use store::{Settings, Store};
+
+/// Turn a folder of panoramas into a checked training folder
+#[derive(Args, Debug)]
+#[command(
+    long_about = "Turn any folder of equirectangular panoramas into a training folder: \
+        train/, val/ (and test/) with half-float EXR files of one size, report.md, report.json and contact.png.\n\n\
+        Folders are searched to the bottom for OpenEXR and Radiance files and for PNG, JPEG and WebP images of any size. Those \
+        hold no more than a display's range: their clipped regions are found and the sun and other highlights rebuilt \
+        (--expand). Every file is checked; what is broken, not twice as wide as high, too small, black, transparent or one grey \
+        is refused and listed with the reason. Sources are never changed.\n\n\
+        Panoramas of one capture stay on one side of the split: by name (street_01_4k, street_02_ev-2 and \
+        street_01_puresky are one capture; numbers of three digits or more are captures of their own) and by content \
+        (near-duplicates at another exposure, turned about the vertical or mirrored). The side follows from --seed and the \
+        capture's name alone. Files inside folders named train, val or test keep their side, unless a near-duplicate is held out.\n\n\
+        Stopped half-way, the same command goes on where it was; run again, it takes in only what is new or changed. \
+        --force begins anew and removes what an earlier run wrote into DIR, nothing else.",
+    after_help = "Exit code 1: ready, but some files were refused.\n\n\
+        Examples:\n  \
+        veni-cli prepare panoramas/ -o data && veni-cli train --data data --out run\n  \
+        veni-cli prepare hdris/ streets/ -o data --size 256x128 --val 0.1 --test 0.1\n  \
+        veni-cli prepare hdris/ -o data --expand off          no LDR images"
+)]
+pub(crate) struct Prepare {
+    /// Folders and image files
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
+
+    /// Folder for the training set, created if missing
+    #[arg(long, short, value_name = "DIR")]
+    output: PathBuf,
+
+    /// Width, or width x height, of the panoramas written; smaller ones are refused
+    #[arg(long, value_name = "W|WxH", default_value = "128x64")]
+    size: Size,
+
+    /// Share of the captures for validation
+    #[arg(long, value_name = "SHARE", default_value = "0.1", value_parser = share)]
+    val: f64,
+
+    /// Share of the captures for testing
+    #[arg(long, value_name = "SHARE", default_value = "0", value_parser = share)]
+    test: f64,
+
+    /// Which captures go where
+    #[arg(long, short, value_name = "S", default_value = "0")]
+    seed: u64,
+
+    /// Split anew also what lies in folders named train, val or test
+    #[arg(long)]
+    resplit: bool,
+
+    /// What becomes of images with a display's range
+    #[arg(long, value_enum, default_value_t)]
+    expand: Expand,
+
+    /// They were encoded by this power instead of the sRGB curve
+    #[arg(long, value_name = "G", value_parser = gamma)]
+    gamma: Option<f32>,
+
+    #[command(flatten)]
+    force: Force,
+}
+
+/// What becomes of LDR images.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Expand {
+    /// Rebuild what is clipped
+    #[default]
+    Auto,
+    /// Refuse them
+    Off,
+}
+
+impl Prepare {
+    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        let (width, height) = self.size.equirect()?;
+        if width < 8 {
+            bail!("--size {}: a panorama to learn from has at least 8 x 4 pixels", self.size);
+        }
+        if self.val + self.test >= 1.0 {
+            bail!("--val {} and --test {} leave nothing to train on: give less", self.val, self.test);
+        }
+        let expand = (self.expand == Expand::Auto).then(|| ExpandOptions {
+            transfer: self.gamma.map_or(Transfer::Srgb, Transfer::Gamma),
+            ..ExpandOptions::default()
+        });
+        let settings = Settings::new(width, height, expand.as_ref());
+        let config =
+            PrepareConfig { grid: Equirect::new(width, height), expand, read: ReadOptions::default() };
+        let found = scan::scan(&self.inputs, &self.output)?;
+        if found.sources.is_empty() {
+            bail!("{}: no image files in there; name a folder that has some", scan::names(&self.inputs));
+        }
+        let mut store = Store::open(&self.output, &settings, self.force.force)?;
+        work::examine_all(&mut store, &found.sources, &config, report)?;
+        let shares = Shares { val: self.val, test: self.test };
+        let placing = Placing { shares, seed: self.seed, resplit: self.resplit };
+        let placed = place::place(&mut store, &placing)?;
+        contact::write(&store, &placed)?;
+        report::write(&store, &settings, &placing, &placed, &found.ignored)?;
+        report::print(&self.output, &placed, report)
+    }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|s| (0.0..1.0).contains(s));
+    share.ok_or_else(|| format!("'{text}' is no share: give a number from 0 to below 1, like 0.1"))
+}
+
+fn gamma(text: &str) -> Result<f32, String> {
+    let gamma = text.parse().ok().filter(|g| (0.5..=4.0).contains(g));
+    gamma.ok_or_else(|| format!("'{text}' is no gamma: give a number from 0.5 to 4, like 2.2"))
+}

@@ -1,0 +1,113 @@
+//! What is remembered of each file that was examined.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use veni_core::panorama::Sanitised;
+use veni_core::panorama::expand::Sun;
+use veni_core::prepare::{Examined, Fingerprint, Split, capture};
+
+use super::scan::Source;
+
+/// One examined file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Record {
+    /// Its one true name; with size and time it tells whether the file is still the one examined.
+    pub(super) key: String,
+    pub(super) bytes: u64,
+    pub(super) modified: u64,
+    /// As the user named it.
+    pub(super) source: String,
+    pub(super) given: Option<Split>,
+    pub(super) fate: Fate,
+}
+
+/// Whether a file is fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Fate {
+    Fit(Box<Facts>),
+    Refused(String),
+}
+
+/// What is known of a panorama that is fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Facts {
+    /// Hash of the file's content; the prepared image is kept under it.
+    pub(super) id: String,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// Stops from median to brightest luminance.
+    pub(super) stops: f32,
+    /// Mean ln luminance.
+    pub(super) log_exposure: f32,
+    pub(super) replaced: Replaced,
+    pub(super) expanded: Option<Expansion>,
+    pub(super) fingerprint: Fingerprint,
+}
+
+/// Values that were painted over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Replaced {
+    pub(super) nan: usize,
+    pub(super) infinite: usize,
+    pub(super) not_positive: usize,
+}
+
+/// What was rebuilt of an LDR panorama.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Expansion {
+    /// Share of the sphere that was clipped.
+    pub(super) clipped: f64,
+    pub(super) sun_direction: Option<[f32; 3]>,
+    pub(super) sun_energy: Option<f64>,
+}
+
+impl Record {
+    pub(super) fn new(source: &Source, fate: Fate) -> Self {
+        let Source { key, bytes, modified, path, given } = source.clone();
+        Self { key, bytes, modified, source: path.display().to_string(), given, fate }
+    }
+
+    /// Whether `source` is the file that this was written about, unchanged since.
+    pub(super) fn is_of(&self, source: &Source) -> bool {
+        (&self.key, self.bytes, self.modified) == (&source.key, source.bytes, source.modified)
+    }
+
+    pub(super) fn facts(&self) -> Option<&Facts> {
+        match &self.fate {
+            Fate::Fit(facts) => Some(facts),
+            Fate::Refused(_) => None,
+        }
+    }
+
+    /// The file's name without folder and extension.
+    pub(super) fn stem(&self) -> String {
+        Path::new(&self.source).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    pub(super) fn capture(&self) -> String {
+        capture(Path::new(&self.source))
+    }
+}
+
+impl Facts {
+    pub(super) fn new(id: String, examined: &Examined) -> Self {
+        let Sanitised { nan, infinite, not_positive } = examined.replaced;
+        let expansion = |(clipped, sun): (f64, Option<Sun>)| Expansion {
+            clipped,
+            sun_direction: sun.map(|s| s.direction),
+            sun_energy: sun.map(|s| s.energy),
+        };
+        Self {
+            id,
+            width: examined.size.width,
+            height: examined.size.height,
+            stops: examined.stops,
+            log_exposure: examined.panorama.mean_log_luminance(),
+            replaced: Replaced { nan, infinite, not_positive },
+            expanded: examined.expanded.map(expansion),
+            fingerprint: examined.fingerprint.clone(),
+        }
+    }
+}

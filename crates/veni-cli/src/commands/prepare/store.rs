@@ -1,0 +1,257 @@
+//! `DIR/.prepare`: what was examined, so that a run can go on where another stopped.
+//!
+//! | file | what |
+//! |---|---|
+//! | `settings.json` | what the images depend on; other settings need `--force` |
+//! | `records*.jsonl` | one line per examined file, appended as it is done |
+//! | `images/ID.exr` | prepared images that are not placed yet |
+//! | `plan.json` | where each image is, or is being moved: former places, then the wanted one |
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use serde::{Deserialize, Serialize};
+use veni_core::Error;
+use veni_core::output::{Overwrite, write_atomic};
+use veni_core::panorama::Transfer;
+use veni_core::panorama::expand::ExpandOptions;
+
+use super::record::Record;
+use super::scan::Source;
+use crate::output::writable;
+
+/// Changes when images, fingerprints or records of an older program can no longer be gone on with.
+const FORMAT: u32 = 1;
+
+/// What prepared images depend on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Settings {
+    format: u32,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// "off", "srgb", or the gamma.
+    pub(super) expand: String,
+}
+
+/// The folder that is filled.
+pub(super) struct Store {
+    root: PathBuf,
+    /// By the files' true names.
+    records: BTreeMap<String, Record>,
+    log: File,
+    /// Places of images, relative to the folder, by their id.
+    plan: BTreeMap<String, Vec<String>>,
+}
+
+impl Settings {
+    pub(super) fn new(width: usize, height: usize, expand: Option<&ExpandOptions>) -> Self {
+        let expand = match expand.map(|e| e.transfer) {
+            None => "off".to_owned(),
+            Some(Transfer::Gamma(gamma)) => format!("gamma {gamma}"),
+            Some(_) => "srgb".to_owned(),
+        };
+        Self { format: FORMAT, width, height, expand }
+    }
+}
+
+impl Store {
+    /// Opens the folder, or makes it. Refuses one that holds other things or was made with other settings; with
+    /// `force` it removes what an earlier run wrote and begins anew.
+    pub(super) fn open(root: &Path, settings: &Settings, force: bool) -> Result<Self> {
+        let own = root.join(".prepare");
+        if root.exists() && !root.is_dir() {
+            bail!("{}: is a file; name a folder", root.display());
+        }
+        if !force && !own.is_dir() && root.is_dir() {
+            let first = fs::read_dir(root).map_err(|e| Error::io(root, "list", e))?.next();
+            if let Some(entry) = first {
+                let name = entry.map_err(|e| Error::io(root, "list", e))?.file_name();
+                bail!(
+                    "{}: holds other things ({}) already; name a new folder, or add to this one with --force",
+                    root.display(),
+                    name.to_string_lossy()
+                );
+            }
+        }
+        create(root)?;
+        writable(root, root)?;
+        if force && own.is_dir() {
+            Self::read(root)?.clear()?;
+        }
+        create(&own.join("images"))?;
+        let file = own.join("settings.json");
+        match fs::read(&file) {
+            Ok(bytes) => {
+                let old: Settings = serde_json::from_slice(&bytes)
+                    .with_context(|| format!("{}: damaged; begin anew with --force", file.display()))?;
+                if old != *settings {
+                    bail!(
+                        "{}: was prepared with other settings (--size {}x{}, expand {}); give them again, name another folder, or \
+                         begin anew with --force",
+                        root.display(),
+                        old.width,
+                        old.height,
+                        old.expand
+                    );
+                }
+            }
+            Err(_) => write_json(&file, settings)?,
+        }
+        Self::read(root)
+    }
+
+    fn read(root: &Path) -> Result<Self> {
+        let own = root.join(".prepare");
+        let mut records = BTreeMap::new();
+        let mut logs: Vec<PathBuf> = fs::read_dir(&own)
+            .map_err(|e| Error::io(&own, "list", e))?
+            .filter_map(|e| e.ok().map(|e| e.path()))
+            .filter(|p| p.extension().is_some_and(|e| e == "jsonl"))
+            .collect();
+        logs.sort();
+        for log in &logs {
+            let text = fs::read_to_string(log).map_err(|e| Error::io(log, "read", e))?;
+            // a line that a stopped run left unfinished is no record; its file is examined again
+            for record in text.lines().filter_map(|line| serde_json::from_str::<Record>(line).ok()) {
+                records.insert(record.key.clone(), record);
+            }
+        }
+        let path = own.join("records.jsonl");
+        let mut log = OpenOptions::new().create(true).append(true).open(&path);
+        if let Ok(file) = &mut log
+            && file.metadata().is_ok_and(|m| m.len() > 0)
+        {
+            // ends a torn line; an empty one is no record either
+            file.write_all(b"\n").map_err(|e| Error::io(&path, "write", e))?;
+        }
+        let log = log.map_err(|e| Error::io(&path, "open", e))?;
+        let plan = match fs::read(own.join("plan.json")) {
+            Ok(bytes) => serde_json::from_slice(&bytes)
+                .with_context(|| format!("{}: damaged plan.json; begin anew with --force", own.display()))?,
+            Err(_) => BTreeMap::new(),
+        };
+        Ok(Self { root: root.to_path_buf(), records, log, plan })
+    }
+
+    /// Removes all that was written here, and nothing else.
+    fn clear(self) -> Result<()> {
+        for place in self.plan.values().flatten() {
+            remove(&self.root.join(place))?;
+        }
+        let own = self.root.join(".prepare");
+        Ok(fs::remove_dir_all(&own).map_err(|e| Error::io(&own, "remove", e))?)
+    }
+
+    pub(super) fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// All records, in the order of the sources' names.
+    pub(super) fn records(&self) -> Vec<&Record> {
+        let mut all: Vec<_> = self.records.values().collect();
+        all.sort_by(|a, b| (&a.source, &a.key).cmp(&(&b.source, &b.key)));
+        all
+    }
+
+    /// Whether this file was examined, has not changed since, and its image is still there.
+    pub(super) fn is_done(&self, source: &Source) -> bool {
+        self.records.get(&source.key).is_some_and(|record| {
+            record.is_of(source) && record.facts().is_none_or(|facts| self.image(&facts.id).is_some())
+        })
+    }
+
+    /// Remembers a file that was examined, on disk before this returns.
+    pub(super) fn add(&mut self, record: Record) -> Result<()> {
+        let mut line = serde_json::to_vec(&record)?;
+        line.push(b'\n');
+        let path = self.root.join(".prepare/records.jsonl");
+        self.log.write_all(&line).map_err(|e| Error::io(&path, "write", e))?;
+        self.records.insert(record.key.clone(), record);
+        Ok(())
+    }
+
+    /// Where an image waits until it is placed.
+    pub(super) fn waiting(&self, id: &str) -> PathBuf {
+        self.root.join(".prepare/images").join(format!("{id}.exr"))
+    }
+
+    /// Where an image is now.
+    pub(super) fn image(&self, id: &str) -> Option<PathBuf> {
+        let places = self.plan.get(id).into_iter().flatten().map(|place| self.root.join(place));
+        std::iter::once(self.waiting(id)).chain(places).find(|path| path.is_file())
+    }
+
+    /// Moves every image to the place that `wanted` names (relative to the folder), and removes those of ids that it does
+    /// not. Whenever it is stopped, no image is lost: the plan is on disk before anything moves.
+    pub(super) fn move_images(&mut self, wanted: &BTreeMap<String, String>) -> Result<()> {
+        let mut both = self.plan.clone();
+        for (id, place) in wanted {
+            let places = both.entry(id.clone()).or_default();
+            places.retain(|p| p != place);
+            places.push(place.clone());
+        }
+        self.write_plan(both)?;
+        // an image made anew waits while its former self is still in place
+        let owned: BTreeSet<PathBuf> = self.plan.keys().filter_map(|id| self.image(id)).collect();
+        for (_, places) in self.plan.iter().filter(|(id, _)| self.waiting(id).is_file()) {
+            for former in places.iter().map(|place| self.root.join(place)).filter(|p| !owned.contains(p)) {
+                remove(&former)?;
+            }
+        }
+        // first out of the way, then into place: names may be exchanged
+        for id in self.plan.keys() {
+            let Some(now) = self.image(id) else { continue };
+            match wanted.get(id) {
+                None => remove(&now)?,
+                Some(place) if now != self.root.join(place) => rename(&now, &self.waiting(id))?,
+                Some(_) => {}
+            }
+        }
+        for (id, place) in wanted {
+            let (from, to) = (self.waiting(id), self.root.join(place));
+            if from.is_file() {
+                create(to.parent().unwrap_or(&self.root))?;
+                rename(&from, &to)?;
+            }
+        }
+        self.write_plan(wanted.iter().map(|(id, place)| (id.clone(), vec![place.clone()])).collect())
+    }
+
+    fn write_plan(&mut self, plan: BTreeMap<String, Vec<String>>) -> Result<()> {
+        write_json(&self.root.join(".prepare/plan.json"), &plan)?;
+        self.plan = plan;
+        Ok(())
+    }
+}
+
+/// Replaces a JSON file.
+pub(super) fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let mut bytes = serde_json::to_vec_pretty(value)?;
+    bytes.push(b'\n');
+    write_bytes(path, &bytes)
+}
+
+/// Replaces a file.
+pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    let write =
+        |file: &mut std::io::BufWriter<File>| file.write_all(bytes).map_err(|e| Error::io(path, "write", e));
+    Ok(write_atomic(path, Overwrite::Replace, write)?)
+}
+
+fn create(folder: &Path) -> Result<()> {
+    Ok(fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?)
+}
+
+fn rename(from: &Path, to: &Path) -> Result<()> {
+    Ok(fs::rename(from, to).map_err(|e| Error::io(to, "write", e))?)
+}
+
+fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path, "remove", e).into()),
+        _ => Ok(()),
+    }
+}

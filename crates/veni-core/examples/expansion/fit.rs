@@ -1,0 +1,119 @@
+//! The linear functions of the expansion, by least squares.
+
+use veni_core::panorama::expand::{Analysis, FEATURES, Region};
+use veni_core::panorama::{Transfer, luminance};
+
+use crate::Failure;
+use crate::sample::{Sample, read};
+
+/// A region counts as the sun's for its colour if its mean is this many times white.
+const SUNNY: f64 = 10.0;
+
+pub(crate) fn run(folder: &str) -> Result<(), Failure> {
+    let panoramas = read(folder)?;
+    let (mut exponent, mut sun) = (System::<FEATURES>::default(), System::<FEATURES>::default());
+    let (mut red, mut blue) = (System::<2>::default(), System::<2>::default());
+    for sample in Sample::all(&panoramas) {
+        let analysis = Analysis::new(&sample.ldr, Transfer::Srgb);
+        let (grid, truth) = (sample.truth.grid(), sample.truth.pixels());
+        let weight = |pixel: usize| grid.solid_angle(pixel / grid.width);
+        let total: f64 = analysis.regions().iter().map(|r| r.solid_angle).sum();
+        let regions = analysis.regions();
+        let mut energies = vec![[0f64; 3]; regions.len()];
+        for (pixel, region, x) in analysis.pixels() {
+            let target = f64::from(luminance(truth[pixel]).max(1.0)).ln();
+            let row = regions[region].features.map(|f| f * f64::from(x));
+            exponent.add(&row, target, weight(pixel) / total);
+            energies[region]
+                .iter_mut()
+                .zip(truth[pixel])
+                .for_each(|(e, v)| *e += weight(pixel) * f64::from(v));
+        }
+        let Some(chosen) = analysis.sun_region() else { continue };
+        let (Region { solid_angle, features, centre, .. }, [r, g, b]) = (&regions[chosen], energies[chosen]);
+        let mean = (0.2126 * r + 0.7152 * g + 0.0722 * b) / solid_angle;
+        sun.add(features, mean.ln(), 1.0);
+        if mean > SUNNY {
+            let row = [1.0, f64::from(centre[2])];
+            red.add(&row, (r / g).ln(), 1.0);
+            blue.add(&row, (b / g).ln(), 1.0);
+        }
+    }
+    println!(
+        "// {} panoramas of the training set, exposures of {:?} stops",
+        panoramas.len(),
+        crate::sample::STOPS
+    );
+    println!("exponent: {},", exponent.solve("exponent"));
+    println!("sun: {},", sun.solve("sun"));
+    println!("red: {},", red.solve("red"));
+    println!("blue: {},", blue.solve("blue"));
+    Ok(())
+}
+
+/// Weighted least squares for N unknowns.
+struct System<const N: usize> {
+    rows: Vec<([f64; N], f64, f64)>,
+}
+
+impl<const N: usize> Default for System<N> {
+    fn default() -> Self {
+        Self { rows: Vec::new() }
+    }
+}
+
+impl<const N: usize> System<N> {
+    fn add(&mut self, row: &[f64; N], target: f64, weight: f64) {
+        self.rows.push((*row, target, weight));
+    }
+
+    /// The unknowns, as Rust text; on stderr how much of the targets they explain.
+    fn solve(&self, name: &str) -> String {
+        let mut matrix = [[0f64; N]; N];
+        let mut right = [0f64; N];
+        let total: f64 = self.rows.iter().map(|r| r.2).sum();
+        for (row, target, weight) in &self.rows {
+            for i in 0..N {
+                right[i] += weight / total * row[i] * target;
+                for j in 0..N {
+                    matrix[i][j] += weight / total * row[i] * row[j];
+                }
+            }
+        }
+        for (i, row) in matrix.iter_mut().enumerate() {
+            // a trace of ridge keeps features that hardly vary from running away
+            row[i] += 1e-4;
+        }
+        let solution = gauss(matrix, right);
+        let predict = |row: &[f64; N]| row.iter().zip(&solution).map(|(a, b)| a * b).sum::<f64>();
+        let mean = self.rows.iter().map(|(_, t, w)| w * t).sum::<f64>() / total;
+        let spread = |f: &dyn Fn(&[f64; N], f64) -> f64| {
+            self.rows.iter().map(|(r, t, w)| w * f(r, *t).powi(2)).sum::<f64>() / total
+        };
+        let (all, left) = (spread(&|_, t| t - mean), spread(&|r, t| t - predict(r)));
+        eprintln!("{name}: {} rows, deviation {:.3} of {:.3}", self.rows.len(), left.sqrt(), all.sqrt());
+        format!("[{}]", solution.map(|v| format!("{v:.4}")).join(", "))
+    }
+}
+
+/// Gaussian elimination with pivots.
+fn gauss<const N: usize>(mut a: [[f64; N]; N], mut b: [f64; N]) -> [f64; N] {
+    for k in 0..N {
+        let pivot = (k..N).max_by(|i, j| a[*i][k].abs().total_cmp(&a[*j][k].abs())).unwrap_or(k);
+        a.swap(k, pivot);
+        b.swap(k, pivot);
+        for i in k + 1..N {
+            let factor = a[i][k] / a[k][k];
+            let pivot = a[k];
+            a[i].iter_mut().zip(pivot).for_each(|(v, p)| *v -= factor * p);
+            b[i] -= factor * b[k];
+        }
+    }
+    for k in (0..N).rev() {
+        for j in k + 1..N {
+            b[k] -= a[k][j] * b[j];
+        }
+        b[k] /= a[k][k];
+    }
+    b
+}
