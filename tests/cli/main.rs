@@ -11,5 +11,6 @@ mod gpu;
 mod inspect;
 mod readers;
 mod render_probe;
+mod synth;
 mod training;
 mod util;

@@ -2,8 +2,8 @@
 //!
 //! The **lighting world** is what a renderer embeds; it knows nothing of tensors or training:
 //! `sphere` (directions, frames, grids), [`panorama`] (HDR images), [`latent`] (the code),
-//! [`model`] (the weight file), [`field`] (the decoder folded for one latent) and [`shade`] (surfaces under that
-//! light).
+//! [`model`] (the weight file), [`field`] (the decoder folded for one latent), [`shade`] (surfaces under that
+//! light) and [`synth`] (generated outdoor scenes).
 //!
 //! The **learning world** (feature `learn`, on by default) is built on burn: `nn` (equivariant
 //! layers), `vae` (encoder and decoder), `data`, `train`, `fit`, `eval` and `baseline`. It uses the
@@ -17,6 +17,7 @@ pub mod output;
 pub mod panorama;
 pub mod shade;
 pub mod sphere;
+pub mod synth;
 
 #[cfg(feature = "learn")]
 pub mod baseline;

@@ -13,6 +13,7 @@ pub(crate) mod inspect;
 pub(crate) mod man;
 pub(crate) mod render_probe;
 pub(crate) mod sample;
+pub(crate) mod synth;
 #[cfg(feature = "learn")]
 pub(crate) mod train;
 
@@ -26,6 +27,7 @@ pub(crate) fn run(command: Command, report: Report) -> Result<Outcome> {
     match command {
         Command::Bake(c) => c.run(report),
         Command::Sample(c) => c.run(report),
+        Command::Synth(c) => c.run(report),
         #[cfg(feature = "learn")]
         Command::Encode(c) => c.run(report),
         #[cfg(feature = "learn")]

@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use veni_core::Error;
-use veni_core::data::Splits;
+use veni_core::data::{DataConfig, Generated, Splits};
 use veni_core::train::config::DeviceKind;
 use veni_core::train::presets::Preset;
 use veni_core::train::run::{Finish, Trainer};
@@ -43,13 +43,19 @@ const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
         veni-cli train --data hdri --preset small --latent-vectors 9 --seed 1 --out runs/small\n  \
         veni-cli train --data hdri --system reni++ --preset small --out runs/reni\n  \
         veni-cli train --resume --out runs/small\n  \
+        veni-cli train --data hdri --synthetic 10000 --out runs/more   beside 10,000 generated scenes\n  \
         veni-cli train --data hdri --out runs/kld --set loss.kld=0.001 --set batch=8\n  \
         veni-cli train --config runs/small/config.toml --seed 2 --out runs/second"
 )]
 pub(crate) struct Train {
     /// Folders of panoramas (or files)
-    #[arg(long, value_name = "DIR", num_args = 1.., required_unless_present_any = ["resume", "config"])]
+    #[arg(long, value_name = "DIR", num_args = 1..,
+        required_unless_present_any = ["resume", "config", "synthetic"])]
     data: Vec<PathBuf>,
+
+    /// Also train on N generated scenes, as 'veni-cli synth' makes them, drawn with the run's seed
+    #[arg(long, value_name = "N")]
+    synthetic: Option<usize>,
 
     /// Folder of the run
     #[arg(long, short, value_name = "RUN")]
@@ -153,7 +159,7 @@ impl From<TrainDevice> for DeviceKind {
 impl Train {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
         let started = Instant::now();
-        let mut trainer = if self.resume { self.continued()? } else { self.begun()? };
+        let mut trainer = if self.resume { self.continued(report)? } else { self.begun(report)? };
         let stop = stop_on_signal()?;
         let mut watch = Watch::new(report);
         let finish = trainer.run(&stop, &mut watch).map_err(with_remedy)?;
@@ -172,18 +178,22 @@ impl Train {
     }
 
     /// A new run.
-    fn begun(&self) -> Result<Trainer> {
+    fn begun(&self, report: Report) -> Result<Trainer> {
         let config = self.settings()?;
         if self.check_folder()? {
-            // what is there goes only once the new data is known to be good
-            Splits::open(&config.data, config.seed)?;
+            // what is there goes only once the new data is known to be good; of generated scenes one is enough for that
+            let synthetic = config.data.synthetic.min(1);
+            Splits::open(&DataConfig { synthetic, ..config.data.clone() }, config.seed)?;
             self.clear()?;
         }
-        Trainer::create(&self.out, config, &self.command_line()).map_err(with_remedy)
+        let create = |generated: &Generated<'_>| {
+            Trainer::create_with(&self.out, config, &self.command_line(), generated)
+        };
+        watch::generating(report, create).map_err(with_remedy)
     }
 
     /// A run that exists.
-    fn continued(&self) -> Result<Trainer> {
+    fn continued(&self, report: Report) -> Result<Trainer> {
         let stored = self.out.join("config.toml");
         if !stored.is_file() {
             bail!(
@@ -192,7 +202,9 @@ impl Train {
             );
         }
         self.check_same(&stored)?;
-        Ok(Trainer::resume(&self.out, &self.command_line())?)
+        let resume =
+            |generated: &Generated<'_>| Trainer::resume_with(&self.out, &self.command_line(), generated);
+        Ok(watch::generating(report, resume)?)
     }
 
     /// Refuses a folder in use before the data is read. Whether there is a run to clear away (`--force`).

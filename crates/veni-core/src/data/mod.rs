@@ -10,4 +10,4 @@ pub mod exposure;
 pub mod random;
 
 pub use augment::AugmentConfig;
-pub use dataset::{DataConfig, Dataset, Item, Splits, panorama_files};
+pub use dataset::{DataConfig, Dataset, Generated, Item, Splits, panorama_files};

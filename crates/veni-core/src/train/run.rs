@@ -23,7 +23,7 @@ use burn::tensor::Device;
 use serde::Serialize;
 
 use crate::data::random::{Purpose, stream};
-use crate::data::{Dataset, Splits};
+use crate::data::{Dataset, Generated, Splits};
 use crate::eval::metrics::Alignment;
 use crate::eval::reconstruction::Reconstruction;
 use crate::latent::{Latent, Prior};
@@ -77,8 +77,21 @@ impl Trainer {
     /// # Errors
     /// [`Error::Invalid`] if the folder is in use or the configuration does not fit; what reading the data says.
     pub fn create(folder: &Path, config: TrainConfig, command: &str) -> Result<Self> {
+        Self::create_with(folder, config, command, &|_, _| {})
+    }
+
+    /// As [`Trainer::create`]; `progress` is told how many of the generated scenes are there.
+    ///
+    /// # Errors
+    /// As [`Trainer::create`].
+    pub fn create_with(
+        folder: &Path,
+        config: TrainConfig,
+        command: &str,
+        progress: &Generated<'_>,
+    ) -> Result<Self> {
         config.check()?;
-        let splits = Splits::open(&config.data, config.seed)?;
+        let splits = Splits::open_with(&config.data, config.seed, progress)?;
         if folder.exists() && fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?.next().is_some()
         {
             let folder = folder.display();
@@ -103,10 +116,18 @@ impl Trainer {
     /// # Errors
     /// [`Error::Io`] or [`Error::Invalid`] if `config.toml` or the checkpoint cannot be read or do not fit together.
     pub fn resume(folder: &Path, command: &str) -> Result<Self> {
+        Self::resume_with(folder, command, &|_, _| {})
+    }
+
+    /// As [`Trainer::resume`]; `progress` is told how many of the generated scenes are there.
+    ///
+    /// # Errors
+    /// As [`Trainer::resume`].
+    pub fn resume_with(folder: &Path, command: &str, progress: &Generated<'_>) -> Result<Self> {
         let path = folder.join("config.toml");
         let text = fs::read_to_string(&path).map_err(|e| Error::io(&path, "read", e))?;
         let config = TrainConfig::from_toml(&text).map_err(|e| e.in_file(&path))?;
-        let splits = Splits::open(&config.data, config.seed)?;
+        let splits = Splits::open_with(&config.data, config.seed, progress)?;
         let mut trainer = Self::fresh(folder, config, splits, command)?;
         let path = trainer.checkpoint_path();
         if path.exists() {

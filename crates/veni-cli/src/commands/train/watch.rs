@@ -1,5 +1,8 @@
 //! What a person sees of a run while it goes.
 
+use std::sync::Mutex;
+
+use veni_core::data::Generated;
 use veni_core::eval::reconstruction::MeanScores;
 use veni_core::train::progress::{self, StepReport, ValidationReport};
 
@@ -23,6 +26,21 @@ impl Watch {
             bar.finish();
         }
     }
+}
+
+/// Shows how many scenes are generated while `open` opens a run.
+pub(super) fn generating<T>(report: Report, open: impl FnOnce(&Generated<'_>) -> T) -> T {
+    let bar = Mutex::new(None);
+    let opened = open(&|done, total| {
+        if let Ok(mut bar) = bar.lock() {
+            let start = || Progress::start(report, "generated sky", 0, total as u64);
+            bar.get_or_insert_with(start).set(done as u64, String::new);
+        }
+    });
+    if let Ok(Some(bar)) = bar.into_inner() {
+        bar.finish();
+    }
+    opened
 }
 
 impl progress::Progress for Watch {
