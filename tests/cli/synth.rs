@@ -58,7 +58,10 @@ fn what_is_asked_for_is_in_the_picture() {
     dir.ok(&synth(&[&asked[..], &["--cloud-cover", "0", "-o", "noon", "--sheet", "noon.png"]].concat()));
     let [value] = &dir.json(&["inspect", "noon/synth-000000.exr"])[..] else { panic!("one object") };
     let sun = |name: &str| value["sun"][name].as_f64().unwrap_or_else(|| panic!("{name} in {value}"));
-    assert!((sun("elevation_degrees") - 50.0).abs() < 6.0 && (sun("azimuth_degrees") + 70.0).abs() < 9.0, "{value}");
+    assert!(
+        (sun("elevation_degrees") - 50.0).abs() < 6.0 && (sun("azimuth_degrees") + 70.0).abs() < 9.0,
+        "{value}"
+    );
     let sheet = image::open(dir.path("noon.png")).unwrap();
     assert_eq!((sheet.width(), sheet.height()), (32 + 8, 16 + 8));
     dir.ok(&synth(&["--sheet", "only.png", "-n", "9"]));

@@ -131,9 +131,9 @@ impl Cloud {
         let mut v = if d.stretch > 1.5 {
             // fibres bend
             let bend = fractal2(q * 0.6, 2, 0.5, footprint * 0.6, d.seed ^ 0x51);
-            fractal2(q + Vec2::new(0.0, 0.7 * bend), octaves, 0.55, footprint, d.seed)
+            fractal2(q + Vec2::new(0.0, 0.7 * bend), octaves, 0.62, footprint, d.seed)
         } else {
-            fractal2(q, octaves, 0.5, footprint, d.seed)
+            fractal2(q, octaves, if octaves > 3 { 0.62 } else { 0.5 }, footprint, d.seed)
         };
         if d.cells > 0.0 {
             let cells = fractal2(q * 7.0, 2, 0.4, footprint * 7.0, d.seed ^ 0xce11);
@@ -253,7 +253,7 @@ impl Cloud {
         let tilt = (up * up + 2.0 * d.base / EARTH).sqrt().min(1.0);
         let width = footprint * distance * (0.5 + 0.5 / tilt);
         let v = self.field(p, width);
-        let edge = ((v - self.threshold) / (0.15 + 0.5 * d.ragged)).clamp(0.0, 1.0);
+        let edge = ((v - self.threshold) / (0.25 + 0.7 * d.ragged)).clamp(0.0, 1.0);
         let depth = d.depth * edge * edge * (3.0 - 2.0 * edge) * (1.4 * d.ragged * v).exp();
         if depth < 1e-3 {
             return None;

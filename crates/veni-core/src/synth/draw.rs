@@ -61,20 +61,21 @@ impl Scene {
         let mut draw = Draw::new(seed, index, Stream::Scene);
         let draw = &mut draw;
         let sky = draw.weighted(&[
-            (0.22, SkyKind::Clear),
-            (0.27, SkyKind::Cloudy),
-            (0.17, SkyKind::Overcast),
-            (0.24, SkyKind::Sunset),
+            (0.29, SkyKind::Clear),
+            (0.23, SkyKind::Cloudy),
+            (0.13, SkyKind::Overcast),
+            (0.25, SkyKind::Sunset),
             (0.10, SkyKind::Night),
         ]);
         let sky = fixed.sky.unwrap_or(sky);
         let place = draw.weighted(&[
-            (0.24, Place::Plain),
-            (0.12, Place::Hills),
+            (0.17, Place::PureSky),
+            (0.15, Place::Plain),
+            (0.10, Place::Hills),
             (0.05, Place::Coast),
             (0.06, Place::Lake),
             (0.10, Place::Park),
-            (0.08, Place::Forest),
+            (0.09, Place::Forest),
             (0.08, Place::Village),
             (0.09, Place::Street),
             (0.07, Place::Square),
@@ -87,12 +88,12 @@ impl Scene {
         let sun_elevation = fixed.sun_elevation.unwrap_or(elevation);
         let azimuth = draw.azimuth().to_degrees();
         let haze = draw.normal(0.0, 0.35).exp();
-        let turbidity = (if sky == SkyKind::Overcast { 3.6 } else { 2.6 } * haze).clamp(1.7, 9.0);
+        let turbidity = (if sky == SkyKind::Overcast { 3.4 } else { 2.25 } * haze).clamp(1.7, 9.0);
         let clouds = clouds(draw, sky, fixed.cloud_cover);
         let moon = moon(draw, sun_elevation);
         let settled =
             matches!(place, Place::Street | Place::Square | Place::Courtyard | Place::Village | Place::Park);
-        let glow = draw.log_range(1e-7, 4e-5) * if settled { 3.0 } else { 0.5 };
+        let glow = draw.log_range(5e-7, 2e-4) * if settled { 3.0 } else { 0.5 };
         let warm = draw.range(0.0, 1.0);
         let mut ground = ground(draw, place);
         if let Some(albedo) = fixed.ground_albedo {
@@ -101,9 +102,9 @@ impl Scene {
         }
         let ridges = ridges(draw, place, &ground);
         // what the camera leaves of a coloured cast: it takes the light of noon as white, more or less
-        let cast = draw.normal(0.0, 0.10);
+        let cast = draw.normal(-0.22, 0.12);
         let tint = draw.normal(0.0, 0.03);
-        let white = [(0.5 * cast).exp(), tint.exp(), (-0.5 * cast).exp()];
+        let white = [(0.4 * cast).exp(), tint.exp(), (-0.8 * cast).exp()];
         Self {
             seed,
             index,
@@ -158,7 +159,7 @@ fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<Deck> {
         SkyKind::Clear => [0.08, 0.03, 0.3],
         SkyKind::Cloudy => [0.75, 0.4, 0.45],
         SkyKind::Overcast => [0.5, 1.0, 0.0],
-        SkyKind::Sunset => [0.4, 0.4, 0.5],
+        SkyKind::Sunset => [0.3, 0.3, 0.5],
         SkyKind::Night => [0.25, 0.2, 0.3],
     };
     let mut decks = Vec::new();
@@ -242,7 +243,7 @@ fn ground(draw: &mut Draw, place: Place) -> Ground {
     let snow = draw.chance(0.06);
     let country = [(4.0, Grass), (2.5, DryGrass), (1.5, Soil), (0.8, Sand), (0.7, Rock), (0.3, Asphalt)];
     let (first, second): (&[(f32, Surface)], &[(f32, Surface)]) = match place {
-        Place::Plain | Place::Hills => {
+        Place::PureSky | Place::Plain | Place::Hills => {
             (&country, &[(1.0, Soil), (1.0, DryGrass), (0.6, Asphalt), (0.6, Rock), (1.0, Grass)])
         }
         Place::Coast => (&[(2.0, Sand), (1.0, Rock), (0.7, Grass), (0.5, Paving)], &[(1.0, Water)]),
@@ -272,10 +273,10 @@ fn ground(draw: &mut Draw, place: Place) -> Ground {
         Place::Coast | Place::Lake => &[(1.0, Pattern::Shore)],
         Place::Street => &[(1.0, Pattern::Strip)],
         Place::Park | Place::Village => {
-            &[(1.0, Pattern::Patches), (2.0, Pattern::Strip), (1.0, Pattern::None)]
+            &[(1.0, Pattern::Patches), (1.2, Pattern::Strip), (1.0, Pattern::None)]
         }
         Place::Square | Place::Courtyard => &[(1.0, Pattern::Patches), (2.0, Pattern::None)],
-        _ => &[(2.0, Pattern::Patches), (1.2, Pattern::Strip), (1.5, Pattern::None)],
+        _ => &[(2.0, Pattern::Patches), (0.7, Pattern::Strip), (1.5, Pattern::None)],
     };
     let pattern = draw.weighted(patterns);
     let strip = draw.log_range(0.6, 5.0);
@@ -296,6 +297,7 @@ fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridge> {
     let snowy = ground.surface == Surface::Snow;
     let mut out = Vec::new();
     let [hills, mountains, trees, town] = match place {
+        Place::PureSky => [0.0; 4],
         Place::Plain => [0.55, 0.15, 0.45, 0.1],
         Place::Hills => [1.0, 0.5, 0.5, 0.05],
         Place::Coast => [0.5, 0.25, 0.15, 0.15],
@@ -339,8 +341,8 @@ fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridge> {
     if draw.chance(mountains) {
         out.push(range);
     }
-    let near = if place == Place::Forest { 45.0 } else { 70.0 };
-    let distance = draw.log_range(near, 500.0);
+    let [near, far] = if place == Place::Forest { [32.0, 60.0] } else { [70.0, 500.0] };
+    let distance = draw.log_range(near, far);
     let wood = Ridge {
         kind: RidgeKind::Trees,
         distance,

@@ -53,12 +53,12 @@ impl Ground {
         if surface == Surface::Water {
             return Patch { albedo: surface.albedo(), normal: self.waves(p, footprint), water: 1.0 };
         }
-        let v = fractal2(p / size, 6, 0.72, footprint / size, seed);
+        let v = fractal2(p / size, 6, 0.85, footprint / size, seed);
         let broad = fractal2(p / (9.0 * size), 3, 0.6, footprint / (9.0 * size), seed ^ 0xb4);
         let slope = |k: u32| contrast * 0.6 * fractal2(p / size, 4, 0.7, footprint / size, seed ^ k);
         let tint = Vec3::new(1.0 + 0.25 * contrast * broad, 1.0, 1.0 - 0.25 * contrast * broad);
         Patch {
-            albedo: surface.albedo() * tint * (contrast * (v + 0.7 * broad)).exp(),
+            albedo: surface.albedo() * tint * (contrast * (v + 0.8 * broad)).exp(),
             normal: Vec3::new(slope(1), slope(2), 1.0).normalize(),
             water: 0.0,
         }

@@ -48,6 +48,9 @@ pub(super) fn layout(scene: &Scene) -> Layout {
         layout: Layout::default(),
     };
     builder.place(scene.place, scene.fullness);
+    if scene.lit {
+        builder.distant_lamps();
+    }
     // a wall or crown may have come to stand where the viewer is
     builder.layout.solids.retain(|s| !covers_eye(s, scene.eye));
     builder.layout
@@ -65,6 +68,7 @@ impl Builder {
     fn place(&mut self, place: Place, fullness: f32) {
         let many = |least: f32, most: f32| (least + (most - least) * fullness) as usize;
         match place {
+            Place::PureSky => return,
             Place::Plain | Place::Coast | Place::Hills => {
                 if self.draw.chance(0.4 * fullness) {
                     self.trees(many(1.0, 8.0), 12.0, 60.0);
@@ -87,7 +91,7 @@ impl Builder {
                 self.layout.solids.retain(|s| middle(s).dot(shore) < 1.0);
             }
             Place::Park => {
-                self.trees(many(5.0, 34.0), 5.0, 60.0);
+                self.trees(many(6.0, 40.0), 3.5, 60.0);
                 self.bushes(many(0.0, 16.0), 4.0, 40.0);
                 if self.draw.chance(0.3) {
                     self.houses(2, 30.0, 60.0);
@@ -97,7 +101,7 @@ impl Builder {
             Place::Forest => self.forest(fullness),
             Place::Village => {
                 self.houses(many(3.0, 10.0), 10.0, 45.0);
-                self.trees(many(2.0, 14.0), 6.0, 50.0);
+                self.trees(many(3.0, 18.0), 4.0, 50.0);
                 self.bushes(many(2.0, 16.0), 4.0, 30.0);
                 self.lamp_posts(2, 6.0, 25.0);
             }
@@ -150,8 +154,8 @@ impl Builder {
         if self.snow && self.draw.chance(0.6) {
             return Vec3::new(0.35, 0.36, 0.38);
         }
-        let green = Vec3::new(0.065, 0.095, 0.028);
-        let autumn = Vec3::new(0.20, 0.10, 0.03);
+        let green = Vec3::new(0.095, 0.125, 0.05);
+        let autumn = Vec3::new(0.24, 0.13, 0.05);
         let t = if self.draw.chance(0.12) { self.draw.unit() } else { 0.0 };
         green.lerp(autumn, t) * self.draw.log_range(0.6, 1.5)
     }
@@ -201,14 +205,11 @@ impl Builder {
         );
         let low = height * self.draw.range(0.05, 0.3);
         let radius = height * self.draw.range(0.14, 0.24);
+        let open = self.draw.range(0.05, 0.4);
         self.add(
             Shape::Spire { centre: at, radius, low, high: height },
-            Skin::Leaves { albedo, open: self.draw_open(), size: 0.5 },
+            Skin::Leaves { albedo, open, size: 0.5 },
         );
-    }
-
-    fn draw_open(&mut self) -> f32 {
-        self.draw.range(0.05, 0.4)
     }
 
     fn bushes(&mut self, count: usize, near: f32, far: f32) {
@@ -420,6 +421,22 @@ impl Builder {
         self.layout.lamps.push(Lamp { position: at.extend(height + 0.15), intensity });
     }
 
+    /// The lights of a road or a village far off.
+    fn distant_lamps(&mut self) {
+        let count = self.draw.count(0, 40);
+        let spread = self.draw.range(0.2, 3.1);
+        let middle = self.draw.azimuth();
+        for _ in 0..count {
+            let distance = self.draw.log_range(60.0, 400.0);
+            let at = Vec2::from_angle(middle + self.draw.range(-spread, spread)) * distance;
+            let warm = self.draw.unit();
+            let colour = Vec3::new(1.9, 0.75, 0.12).lerp(Vec3::new(1.1, 1.0, 0.8), warm);
+            let position = at.extend(self.draw.range(4.0, 9.0));
+            let intensity = colour * self.draw.log_range(0.3, 3.0);
+            self.layout.lamps.push(Lamp { position, intensity });
+        }
+    }
+
     fn forest(&mut self, fullness: f32) {
         let count = (30.0 + 110.0 * fullness) as usize;
         let bark = self.bark();
@@ -462,7 +479,7 @@ impl Builder {
         self.layout.canopy = Some(Canopy {
             height: self.draw.range(7.0, 15.0),
             threshold: self.draw.range(-0.15, 0.7) * (0.4 + 0.6 * fullness),
-            scale: self.draw.range(2.0, 5.0),
+            scale: self.draw.range(1.0, 3.0),
             albedo,
             radius: 70.0,
             seed: self.draw.bits(),

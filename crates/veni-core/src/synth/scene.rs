@@ -71,6 +71,9 @@ impl SkyKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Place {
+    /// Nothing but sky; below the horizon its blurred mirror image, as in the many published panoramas from which the
+    /// ground was removed.
+    PureSky,
     /// Open land up to the horizon.
     Plain,
     /// Hills or mountains around.
@@ -99,7 +102,8 @@ pub enum Place {
 
 impl Place {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
+        Self::PureSky,
         Self::Plain,
         Self::Hills,
         Self::Coast,
@@ -184,15 +188,15 @@ impl Surface {
     /// Albedo under daylight: typical values of field measurements (ECOSTRESS and USGS spectral libraries).
     pub(super) fn albedo(self) -> Vec3 {
         match self {
-            Self::Grass => Vec3::new(0.055, 0.085, 0.025),
-            Self::DryGrass => Vec3::new(0.21, 0.16, 0.085),
-            Self::Soil => Vec3::new(0.16, 0.11, 0.07),
-            Self::Sand => Vec3::new(0.40, 0.31, 0.20),
-            Self::Rock => Vec3::new(0.22, 0.20, 0.175),
+            Self::Grass => Vec3::new(0.062, 0.082, 0.034),
+            Self::DryGrass => Vec3::new(0.20, 0.165, 0.105),
+            Self::Soil => Vec3::new(0.15, 0.115, 0.085),
+            Self::Sand => Vec3::new(0.38, 0.32, 0.24),
+            Self::Rock => Vec3::new(0.22, 0.205, 0.19),
             Self::Snow => Vec3::new(0.80, 0.82, 0.85),
             Self::Asphalt => Vec3::new(0.095, 0.095, 0.095),
-            Self::Paving => Vec3::new(0.26, 0.24, 0.215),
-            Self::Leaves => Vec3::new(0.13, 0.075, 0.035),
+            Self::Paving => Vec3::new(0.25, 0.24, 0.225),
+            Self::Leaves => Vec3::new(0.12, 0.085, 0.055),
             Self::Water => Vec3::new(0.018, 0.03, 0.035),
         }
     }
@@ -200,15 +204,15 @@ impl Surface {
     /// Size of its largest patches, and how much they differ (deviation of ln albedo).
     pub(super) fn texture(self) -> (f32, f32) {
         match self {
-            Self::Grass => (3.0, 0.35),
-            Self::DryGrass => (2.5, 0.35),
-            Self::Soil => (2.0, 0.30),
-            Self::Sand => (4.0, 0.12),
-            Self::Rock => (1.5, 0.45),
-            Self::Snow => (6.0, 0.05),
-            Self::Asphalt => (5.0, 0.16),
-            Self::Paving => (1.2, 0.22),
-            Self::Leaves => (1.0, 0.55),
+            Self::Grass => (3.0, 0.55),
+            Self::DryGrass => (2.5, 0.55),
+            Self::Soil => (2.0, 0.5),
+            Self::Sand => (4.0, 0.22),
+            Self::Rock => (1.5, 0.6),
+            Self::Snow => (6.0, 0.09),
+            Self::Asphalt => (5.0, 0.26),
+            Self::Paving => (1.2, 0.36),
+            Self::Leaves => (1.0, 0.75),
             Self::Water => (8.0, 0.0),
         }
     }

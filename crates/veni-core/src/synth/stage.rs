@@ -8,16 +8,19 @@ use super::ambient::Ambient;
 use super::ground::fresnel;
 use super::layout::{Canopy, Lamp, layout};
 use super::noise::fractal2;
-use super::scene::Scene;
+use super::scene::{Place, Scene};
 use super::sky::{Sky, spiral};
 use super::solid::{Hit, Skin, Solids};
 use super::spectrum::luminance;
 use super::terrain::{Ridges, Slope};
 
 /// Radiance of a lit window, kcd/m².
-const WINDOW: Vec3 = Vec3::new(0.11, 0.072, 0.036);
+const WINDOW: Vec3 = Vec3::new(0.034, 0.023, 0.012);
 /// Above this height the open sky lights things, below it what the viewer sees of it, metres.
 const OPEN_HEIGHT: f32 = 14.0;
+
+/// Lamps further away than this light nothing, metres.
+const LAMP_REACH: f32 = 60.0;
 
 /// Everything that a ray needs.
 pub(super) struct Stage<'a> {
@@ -175,6 +178,9 @@ impl<'a> Stage<'a> {
         for lamp in &self.lamps {
             let to = lamp.position - point;
             let distance2 = to.length_squared().max(0.3);
+            if distance2 > LAMP_REACH * LAMP_REACH {
+                continue;
+            }
             front += lamp.intensity * (normal.dot(to) / distance2.sqrt()).max(0.0) / distance2;
         }
         let open = (point.z / OPEN_HEIGHT).clamp(0.0, 1.0);
@@ -196,7 +202,7 @@ impl<'a> Stage<'a> {
         let mut out = if let Skin::Leaves { .. } = solid.skin {
             // leaves face all ways, let light through, and shade each other more the deeper they sit
             let deep =
-                if hit.normal.dot(direction) > 0.0 { 0.45 } else { 0.55 + 0.35 * hit.normal.z.max(-0.6) };
+                if hit.normal.dot(direction) > 0.0 { 0.5 } else { 0.65 + 0.3 * hit.normal.z.max(-0.6) };
             let through = Vec3::new(0.8, 1.0, 0.35);
             albedo / PI * (front * deep + 0.5 * through * back)
         } else {
@@ -219,16 +225,19 @@ impl<'a> Stage<'a> {
     /// The underside of a canopy: leaves against the light.
     fn leaves(&self, point: Vec3, direction: Vec3) -> Vec3 {
         let canopy = self.canopy.as_ref().map_or(Vec3::ZERO, |c| c.albedo);
-        let dense = 1.0 + fractal2(Vec2::new(point.x, point.y) * 1.3, 3, 0.6, 0.0, 0x1eaf);
+        let dense = (0.9 * fractal2(Vec2::new(point.x, point.y) * 0.9, 4, 0.7, 0.0, 0x1eaf)).exp();
         let direct: Vec3 = self.sources.iter().map(|(e, d)| *e * d.z.max(0.0)).sum();
         let through = Vec3::new(0.75, 1.0, 0.3);
         let below = self.near.at(-Vec3::Z);
-        let above = (direct + self.open.at(Vec3::Z)) * 0.22 * dense;
+        let above = (direct + self.open.at(Vec3::Z)) * 0.13 * dense;
         let own = canopy / PI * (below + through * above);
         self.sky.through_air(own, direction, point.length() * 1e-3)
     }
 
     fn ground(&self, eye: Vec3, direction: Vec3, t: f32, footprint: f32, jitter: f32, mirrors: bool) -> Vec3 {
+        if self.scene.place == Place::PureSky {
+            return self.mirrored_sky(direction, footprint, jitter);
+        }
         let point = eye + t * direction;
         // a sample reaches further along the ray than across
         let grazing = (-direction.z).max(1e-3);
@@ -255,6 +264,21 @@ impl<'a> Stage<'a> {
             out = out.lerp(mirrored + out, patch.water);
         }
         self.sky.through_air(out, direction, t * 1e-3)
+    }
+
+    /// The sky mirrored at the horizon, more blurred and darker further down.
+    fn mirrored_sky(&self, direction: Vec3, footprint: f32, jitter: f32) -> Vec3 {
+        let down = -direction.z;
+        let up = Vec3::new(direction.x, direction.y, down);
+        let (across, along) = up.any_orthonormal_pair();
+        let blur = 0.02 + 0.2 * down;
+        let mut sum = Vec3::ZERO;
+        for k in 0..4 {
+            let (s, c) = (std::f32::consts::TAU * (k as f32 + jitter) / 4.0).sin_cos();
+            let turned = up + blur * (c * across + s * along);
+            sum += self.sky.radiance(turned.with_z(turned.z.abs()).normalize(), footprint + blur, jitter);
+        }
+        0.25 * (1.0 - 0.55 * down) * sum
     }
 
     /// What water shows: things near the shore in the plane of the ray, else the sky.

@@ -129,7 +129,7 @@ fn slope(ridge: &Ridge, flat: Vec2, z: f32, height: f32, footprint: f32) -> Slop
             let seen = (1.0 - width / 3.0).clamp(0.0, 1.0);
             let on = cell(u + 7 * block, v, ridge.seed ^ 0x11) < 0.3;
             let glass = 0.25 * seen * if cell(u + 7 * block, v, ridge.seed ^ 0x12) < 0.5 { 1.0 } else { 0.3 };
-            let shine = if on { 0.35 * seen } else { 0.09 * (1.0 - seen) };
+            let shine = if on { 0.3 * seen } else { 0.05 * (1.0 - seen) };
             // two orientations of fronts
             let turn = if warm > 0.5 { 0.6 } else { -0.6 };
             let normal = (towards + turn * aside).normalize();
