@@ -9,8 +9,6 @@ use std::time::Instant;
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use serde_json::json;
 use veni_core::output::Overwrite;
 use veni_core::panorama::tonemap::Tonemap;
@@ -74,11 +72,11 @@ pub(crate) struct Synth {
     size: Size,
 
     /// Weather or time of day
-    #[arg(long, value_name = "SKY", value_parser = named(&SkyKind::ALL))]
+    #[arg(long, value_name = "SKY", value_parser = named(&SkyKind::ALL, SkyKind::name))]
     scene: Option<SkyKind>,
 
     /// What stands around the viewer
-    #[arg(long, value_name = "PLACE", value_parser = named(&Place::ALL))]
+    #[arg(long, value_name = "PLACE", value_parser = named(&Place::ALL, Place::name))]
     place: Option<Place>,
 
     /// Height of the sun above the horizon; negative after sunset
@@ -117,14 +115,16 @@ pub(crate) struct Synth {
     force: Force,
 }
 
-/// A parser for values that serde knows by name.
-fn named<T>(all: &[T]) -> impl TypedValueParser<Value = T>
+/// A parser for values by name.
+fn named<T>(all: &'static [T], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T>
 where
-    T: Serialize + DeserializeOwned + Clone + Send + Sync + 'static,
+    T: Copy + Send + Sync + 'static,
 {
-    let names = all.iter().filter_map(|v| Some(serde_json::to_value(v).ok()?.as_str()?.to_owned()));
-    PossibleValuesParser::new(names.collect::<Vec<_>>())
-        .try_map(|name| serde_json::from_value(serde_json::Value::String(name)))
+    let names: Vec<_> = all.iter().map(|v| name(*v)).collect();
+    PossibleValuesParser::new(names).try_map(move |text| {
+        // the first parser lets nothing else through
+        all.iter().copied().find(|v| name(*v) == text).ok_or_else(|| format!("{text}: no such name"))
+    })
 }
 
 impl Synth {

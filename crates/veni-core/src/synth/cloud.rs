@@ -142,22 +142,25 @@ impl Cloud {
         v
     }
 
-    /// Density in a heap, 0 to 1, at `p` (km) and `level` (0 at the base, 1 at the highest tops).
-    fn density(&self, p: Vec2, level: f32, footprint: f32, fine: bool) -> f32 {
+    /// Density in a heap, 0 to 1, at `p` (km) and `level` (0 at the base, 1 at the highest tops), and the level of
+    /// the top there.
+    fn density(&self, p: Vec2, level: f32, footprint: f32, fine: bool) -> (f32, f32) {
         if !(0.0..1.0).contains(&level) {
-            return 0.0;
+            return (0.0, 0.0);
         }
         let d = &self.deck;
-        let inside = 3.0 * (self.field(p, footprint) - self.threshold) - 0.9 * level * level.sqrt();
+        let rise = 3.0 * (self.field(p, footprint) - self.threshold);
+        let inside = rise - 0.9 * level * level.sqrt();
         let most = 0.9 * d.ragged;
         if inside < -most {
-            return 0.0;
+            return (0.0, 0.0);
         }
         let size = 2.6 / d.scale;
         let q = Vec3::new(p.x * size, p.y * size, level * d.thickness * size * 1.3);
         let lumps = billows3(q, if fine { 3 } else { 1 }, d.seed ^ 0xb1);
         let rim = (level * 9.0).min(1.0);
-        ((inside + most * lumps) * 2.5).clamp(0.0, 1.0) * rim
+        let top = ((rise + most * lumps).max(0.0) / 0.9).powf(2.0 / 3.0).min(1.0);
+        (((inside + most * lumps) * 2.5).clamp(0.0, 1.0) * rim, top)
     }
 
     /// Distance to height `h` along a ray with sine `up` of its elevation, km.
@@ -195,13 +198,13 @@ impl Cloud {
             let level = (height - d.base) / d.thickness;
             let p = Vec2::new(direction.x, direction.y) * t;
             let width = footprint * t;
-            let density = self.density(p, level, width, width < 0.3 * d.scale);
+            let (density, top) = self.density(p, level, width, width < 0.3 * d.scale);
             if density <= 0.0 {
                 continue;
             }
             let step = (-density * sigma * length).exp();
             let share = through * (1.0 - step);
-            radiance += share * self.lit(direction, p, level, density);
+            radiance += share * self.lit(direction, p, [level, top], density);
             distance += share * t;
             through *= step;
             if through < 0.01 {
@@ -214,7 +217,7 @@ impl Cloud {
     }
 
     /// Source function inside a heap.
-    fn lit(&self, direction: Vec3, p: Vec2, level: f32, density: f32) -> Vec3 {
+    fn lit(&self, direction: Vec3, p: Vec2, [level, top]: [f32; 2], density: f32) -> Vec3 {
         let d = &self.deck;
         let sigma = d.depth / d.thickness;
         let mut light = Vec3::ZERO;
@@ -227,7 +230,7 @@ impl Cloud {
                     let mid = 0.5 * (s + last);
                     let density =
                         self.density(p + towards * mid, level + l.source.z * mid / d.thickness, 0.0, false);
-                    depth += density * sigma * (s - last);
+                    depth += density.0 * sigma * (s - last);
                     last = s;
                 }
             }
@@ -237,7 +240,7 @@ impl Cloud {
             // thin edges have not scattered light often enough to be white
             let often = 0.62 / PI / (1.0 + DIFFUSION * depth) * (0.35 + 0.65 * density);
             light += l.direct * (once + often);
-            let above = (1.0 - level) * d.depth * density.max(0.3);
+            let above = (top - level).max(0.0) * d.depth;
             light += l.sky * 0.75 / (1.0 + DIFFUSION * above);
             light += l.ground * 0.5 * (1.0 - level);
         }

@@ -102,7 +102,7 @@ impl Scene {
         }
         let ridges = ridges(draw, place, &ground);
         // what the camera leaves of a coloured cast: it takes the light of noon as white, more or less
-        let cast = draw.normal(-0.22, 0.12);
+        let cast = draw.normal(-0.22, 0.16);
         let tint = draw.normal(0.0, 0.03);
         let white = [(0.4 * cast).exp(), tint.exp(), (-0.8 * cast).exp()];
         Self {
@@ -117,7 +117,7 @@ impl Scene {
             clouds,
             glow: (glow * Vec3::new(1.3, 0.85, 0.4).lerp(Vec3::new(1.0, 0.95, 0.85), warm)).to_array(),
             place,
-            fullness: draw.unit(),
+            fullness: draw.unit().powf(0.7),
             eye: eye(draw, place),
             ground,
             ridges,
@@ -137,7 +137,7 @@ fn elevation(draw: &mut Draw, sky: SkyKind) -> f32 {
         }
         SkyKind::Overcast => between(4.0, 65.0),
         // more of it just above the horizon
-        SkyKind::Sunset => -7.0 + 15.0 * u.powf(0.85),
+        SkyKind::Sunset => -4.5 + 14.0 * u.powf(0.9),
         SkyKind::Night => between(-40.0, -10.0),
     }
 }
@@ -157,7 +157,7 @@ fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<Deck> {
     let closed = sky == SkyKind::Overcast;
     let [low, sheet, high] = match sky {
         SkyKind::Clear => [0.08, 0.03, 0.3],
-        SkyKind::Cloudy => [0.75, 0.4, 0.45],
+        SkyKind::Cloudy => [0.65, 0.35, 0.45],
         SkyKind::Overcast => [0.5, 1.0, 0.0],
         SkyKind::Sunset => [0.3, 0.3, 0.5],
         SkyKind::Night => [0.25, 0.2, 0.3],
@@ -168,7 +168,7 @@ fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<Deck> {
         kind: DeckKind::Heap,
         base: draw.log_range(0.7, 2.2),
         thickness: draw.log_range(0.25, 1.6),
-        cover: draw.range(0.06, 0.75),
+        cover: draw.range(0.06, 0.62),
         depth: draw.log_range(8.0, 50.0),
         scale: draw.log_range(0.7, 4.0),
         stretch: draw.range(1.0, 1.4),
@@ -238,11 +238,14 @@ fn clouds_forced(draw: &mut Draw, wind: f32, cover: f32) -> Vec<Deck> {
     }]
 }
 
+/// Surfaces by weight.
+type Choices<'a> = &'a [(f32, Surface)];
+
 fn ground(draw: &mut Draw, place: Place) -> Ground {
     use Surface::{Asphalt, DryGrass, Grass, Leaves, Paving, Rock, Sand, Snow, Soil, Water};
     let snow = draw.chance(0.06);
     let country = [(4.0, Grass), (2.5, DryGrass), (1.5, Soil), (0.8, Sand), (0.7, Rock), (0.3, Asphalt)];
-    let (first, second): (&[(f32, Surface)], &[(f32, Surface)]) = match place {
+    let (first, second): (Choices<'_>, Choices<'_>) = match place {
         Place::PureSky | Place::Plain | Place::Hills => {
             (&country, &[(1.0, Soil), (1.0, DryGrass), (0.6, Asphalt), (0.6, Rock), (1.0, Grass)])
         }
@@ -287,7 +290,7 @@ fn ground(draw: &mut Draw, place: Place) -> Ground {
         pattern,
         bearing: draw.azimuth().to_degrees(),
         width: if pattern == Pattern::Shore { shore } else { strip },
-        tone: draw.normal(0.0, 0.22).exp().min(if surface == Snow { 1.1 } else { 2.0 }),
+        tone: draw.normal(-0.2, 0.27).exp().min(if surface == Snow { 1.1 } else { 2.0 }),
         wind: draw.log_range(0.4, 9.0),
         seed: draw.bits(),
     }
@@ -341,7 +344,7 @@ fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridge> {
     if draw.chance(mountains) {
         out.push(range);
     }
-    let [near, far] = if place == Place::Forest { [32.0, 60.0] } else { [70.0, 500.0] };
+    let [near, far] = if place == Place::Forest { [32.0, 60.0] } else { [45.0, 320.0] };
     let distance = draw.log_range(near, far);
     let wood = Ridge {
         kind: RidgeKind::Trees,
@@ -355,7 +358,7 @@ fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridge> {
     if draw.chance(trees) {
         out.push(wood);
     }
-    let distance = draw.log_range(90.0, 900.0);
+    let distance = draw.log_range(60.0, 500.0);
     let skyline = Ridge {
         kind: RidgeKind::Town,
         distance,

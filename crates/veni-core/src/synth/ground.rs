@@ -36,8 +36,9 @@ impl Ground {
             Pattern::None => 0.0,
             Pattern::Patches => soft(fractal2(p / 9.0, 4, 0.6, footprint / 9.0, seed) - 0.1, 0.25),
             Pattern::Strip => {
+                let share = if self.surface == Surface::Paving { 1.0 } else { 0.7 };
                 let bend = 0.35 * fractal2(p / 14.0, 3, 0.5, footprint / 14.0, seed) * self.width.min(3.0);
-                soft(self.width - axis.perp_dot(p).abs() + bend, 0.3)
+                share * soft(self.width - axis.perp_dot(p).abs() + bend, 0.3)
             }
             Pattern::Shore => {
                 let bend =

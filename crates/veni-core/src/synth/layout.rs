@@ -36,6 +36,8 @@ pub(super) struct Layout {
     pub(super) solids: Vec<Solid>,
     pub(super) canopy: Option<Canopy>,
     pub(super) lamps: Vec<Lamp>,
+    /// Irradiance from the lamps of a town all around, klx.
+    pub(super) street_light: Vec3,
 }
 
 /// Builds the surroundings; a function of the scene alone.
@@ -50,6 +52,7 @@ pub(super) fn layout(scene: &Scene) -> Layout {
     builder.place(scene.place, scene.fullness);
     if scene.lit {
         builder.distant_lamps();
+        builder.street_light(scene.place);
     }
     // a wall or crown may have come to stand where the viewer is
     builder.layout.solids.retain(|s| !covers_eye(s, scene.eye));
@@ -70,8 +73,8 @@ impl Builder {
         match place {
             Place::PureSky => return,
             Place::Plain | Place::Coast | Place::Hills => {
-                if self.draw.chance(0.4 * fullness) {
-                    self.trees(many(1.0, 8.0), 12.0, 60.0);
+                if self.draw.chance(0.7 * fullness) {
+                    self.trees(many(1.0, 14.0), 6.0, 60.0);
                 }
                 if self.draw.chance(fullness) {
                     self.bushes(many(2.0, 20.0), 4.0, 40.0);
@@ -183,12 +186,12 @@ impl Builder {
         );
         let spread = height * self.draw.range(0.18, 0.4);
         let open = self.draw.range(0.0, 0.45);
-        let clumps = self.draw.count(2, 5);
+        let clumps = self.draw.count(4, 9);
         for _ in 0..clumps {
-            let off = Vec2::from_angle(self.draw.azimuth()) * spread * self.draw.range(0.1, 0.7);
-            let size = spread * self.draw.range(0.55, 0.9);
-            let z = clear + (height - clear) * self.draw.range(0.3, 0.75);
-            let tall = (0.5 * (height - clear)).min(size * 1.3);
+            let off = Vec2::from_angle(self.draw.azimuth()) * spread * self.draw.range(0.1, 0.85);
+            let size = spread * self.draw.range(0.35, 0.65);
+            let z = clear + (height - clear) * self.draw.range(0.15, 0.85);
+            let tall = size * self.draw.range(0.6, 1.1);
             self.add(
                 Shape::Crown { centre: (at + off).extend(z), radii: Vec3::new(size, size, tall) },
                 Skin::Leaves { albedo, open, size: 0.12 * spread + 0.25 },
@@ -434,6 +437,16 @@ impl Builder {
             let position = at.extend(self.draw.range(4.0, 9.0));
             let intensity = colour * self.draw.log_range(0.3, 3.0);
             self.layout.lamps.push(Lamp { position, intensity });
+        }
+    }
+
+    /// A few lux, as on any lit street.
+    fn street_light(&mut self, place: Place) {
+        let level = self.draw.log_range(4e-4, 8e-3);
+        let warm = self.draw.unit();
+        let colour = Vec3::new(1.7, 0.85, 0.25).lerp(Vec3::new(1.1, 1.0, 0.8), warm);
+        if matches!(place, Place::Street | Place::Square | Place::Courtyard | Place::Village | Place::Park) {
+            self.layout.street_light = level * colour;
         }
     }
 

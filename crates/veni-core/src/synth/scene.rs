@@ -65,6 +65,17 @@ pub enum SkyKind {
 impl SkyKind {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Clear, Self::Cloudy, Self::Overcast, Self::Sunset, Self::Night];
+
+    /// The name in files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Clear => "clear",
+            Self::Cloudy => "cloudy",
+            Self::Overcast => "overcast",
+            Self::Sunset => "sunset",
+            Self::Night => "night",
+        }
+    }
 }
 
 /// What stands around the viewer.
@@ -117,6 +128,25 @@ impl Place {
         Self::Rocks,
         Self::Shelter,
     ];
+
+    /// The name in files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::PureSky => "pure-sky",
+            Self::Plain => "plain",
+            Self::Hills => "hills",
+            Self::Coast => "coast",
+            Self::Lake => "lake",
+            Self::Park => "park",
+            Self::Forest => "forest",
+            Self::Village => "village",
+            Self::Street => "street",
+            Self::Square => "square",
+            Self::Courtyard => "courtyard",
+            Self::Rocks => "rocks",
+            Self::Shelter => "shelter",
+        }
+    }
 }
 
 /// The moon.

@@ -19,6 +19,10 @@ const WINDOW: Vec3 = Vec3::new(0.034, 0.023, 0.012);
 /// Above this height the open sky lights things, below it what the viewer sees of it, metres.
 const OPEN_HEIGHT: f32 = 14.0;
 
+/// Irradiance of street lamps on the houses of a skyline, klx.
+const TOWN: Vec3 = Vec3::new(0.009, 0.0055, 0.0022);
+/// How much denser a canopy gets with every metre, as rays pass through more of it.
+const CANOPY_CLOSES: f32 = 0.025;
 /// Lamps further away than this light nothing, metres.
 const LAMP_REACH: f32 = 60.0;
 
@@ -32,6 +36,7 @@ pub(super) struct Stage<'a> {
     ridges: Ridges,
     /// Sources that no ridge hides: irradiance and direction.
     sources: Vec<(Vec3, Vec3)>,
+    street_light: Vec3,
     open: Ambient,
     near: Ambient,
 }
@@ -56,9 +61,19 @@ impl<'a> Stage<'a> {
         let visible = |d: Vec3, e: Vec3| if d.z <= 0.0 || hidden(d) { Vec3::ZERO } else { e };
         let sources = sky.sources.iter().map(|s| (visible(s.direction, s.direct()), s.direction)).collect();
         let nothing = Ambient::new(&[]);
-        let (canopy, lamps) = (layout.canopy, layout.lamps);
-        let mut this =
-            Self { scene, sky, solids, canopy, lamps, ridges, sources, open: nothing.clone(), near: nothing };
+        let (canopy, lamps, street_light) = (layout.canopy, layout.lamps, layout.street_light);
+        let mut this = Self {
+            scene,
+            sky,
+            solids,
+            canopy,
+            lamps,
+            ridges,
+            sources,
+            street_light,
+            open: nothing.clone(),
+            near: nothing,
+        };
         this.light_up();
         this
     }
@@ -129,7 +144,12 @@ impl<'a> Stage<'a> {
             Thing::Leaves(t) => self.leaves(eye + t * direction, direction),
             Thing::Slope(s) => {
                 let e = self.irradiance_far(s.normal);
-                let own = s.albedo / PI * e + if self.scene.lit { s.shine * WINDOW } else { Vec3::ZERO };
+                let lit = if self.scene.lit && s.town {
+                    s.albedo / PI * TOWN + s.shine * WINDOW
+                } else {
+                    Vec3::ZERO
+                };
+                let own = s.albedo / PI * e + lit;
                 self.sky.through_air(own, direction, s.distance * 1e-3)
             }
             Thing::Ground(t) => self.ground(eye, direction, t, footprint, jitter, mirrors),
@@ -184,13 +204,15 @@ impl<'a> Stage<'a> {
             front += lamp.intensity * (normal.dot(to) / distance2.sqrt()).max(0.0) / distance2;
         }
         let open = (point.z / OPEN_HEIGHT).clamp(0.0, 1.0);
+        front += self.street_light * (1.0 - 0.8 * open);
+
         front += self.near.at(normal).lerp(self.open.at(normal), open);
         (front, back)
     }
 
     fn irradiance_far(&self, normal: Vec3) -> Vec3 {
         let direct: Vec3 = self.sources.iter().map(|(e, d)| *e * normal.dot(*d).max(0.0)).sum();
-        direct + self.open.at(normal)
+        direct + self.open.at(normal) + self.street_light
     }
 
     fn solid(&self, eye: Vec3, direction: Vec3, hit: Hit, footprint: f32, mirrors: bool) -> Vec3 {
@@ -229,7 +251,7 @@ impl<'a> Stage<'a> {
         let direct: Vec3 = self.sources.iter().map(|(e, d)| *e * d.z.max(0.0)).sum();
         let through = Vec3::new(0.75, 1.0, 0.3);
         let below = self.near.at(-Vec3::Z);
-        let above = (direct + self.open.at(Vec3::Z)) * 0.13 * dense;
+        let above = (direct + self.open.at(Vec3::Z)) * 0.08 * dense;
         let own = canopy / PI * (below + through * above);
         self.sky.through_air(own, direction, point.length() * 1e-3)
     }
@@ -278,7 +300,7 @@ impl<'a> Stage<'a> {
             let turned = up + blur * (c * across + s * along);
             sum += self.sky.radiance(turned.with_z(turned.z.abs()).normalize(), footprint + blur, jitter);
         }
-        0.25 * (1.0 - 0.55 * down) * sum
+        0.25 * (1.0 - 0.72 * down) * sum
     }
 
     /// What water shows: things near the shore in the plane of the ray, else the sky.
@@ -321,7 +343,7 @@ fn canopy_hit(canopy: &Canopy, origin: Vec3, direction: Vec3) -> Option<f32> {
             continue;
         }
         let n = fractal2(p / canopy.scale, 5, 0.72, 0.0, canopy.seed ^ (k * 0x77));
-        if n < canopy.threshold {
+        if n < canopy.threshold + CANOPY_CLOSES * p.length() {
             return Some(t);
         }
     }

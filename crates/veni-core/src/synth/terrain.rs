@@ -17,6 +17,8 @@ pub(super) struct Slope {
     pub(super) normal: Vec3,
     /// How much of a lit window is there, 0 to 1.
     pub(super) shine: f32,
+    /// Whether it stands in a town, which lights itself at night.
+    pub(super) town: bool,
 }
 
 impl Ridges {
@@ -110,6 +112,7 @@ fn slope(ridge: &Ridge, flat: Vec2, z: f32, height: f32, footprint: f32) -> Slop
                 albedo,
                 normal: normal.normalize(),
                 shine: 0.0,
+                town: false,
             }
         }
         RidgeKind::Trees => {
@@ -117,7 +120,13 @@ fn slope(ridge: &Ridge, flat: Vec2, z: f32, height: f32, footprint: f32) -> Slop
             let normal =
                 towards * 0.6 + Vec3::Z * (0.3 + 0.5 * rough(size, 1)) + aside * 0.9 * rough(size, 2);
             let albedo = ridge.surface.albedo() * (0.5 * rough(size, 3) - 0.15).exp();
-            Slope { distance: ridge.distance, albedo, normal: normal.normalize_or(towards), shine: 0.0 }
+            Slope {
+                distance: ridge.distance,
+                albedo,
+                normal: normal.normalize_or(towards),
+                shine: 0.0,
+                town: false,
+            }
         }
         RidgeKind::Town => {
             let (block, along) = house(ridge, flat);
@@ -133,7 +142,7 @@ fn slope(ridge: &Ridge, flat: Vec2, z: f32, height: f32, footprint: f32) -> Slop
             // two orientations of fronts
             let turn = if warm > 0.5 { 0.6 } else { -0.6 };
             let normal = (towards + turn * aside).normalize();
-            Slope { distance: ridge.distance, albedo: albedo * (1.0 - glass), normal, shine }
+            Slope { distance: ridge.distance, albedo: albedo * (1.0 - glass), normal, shine, town: true }
         }
     }
 }

@@ -43,6 +43,12 @@ fn a_scene_is_a_function_of_seed_and_index_whatever_the_threads() {
     for (seed, index) in [(5, 12), (6, 11)] {
         assert_ne!(first, render(&Scene::draw(seed, index, &fixed), SMALL));
     }
+    for place in Place::ALL {
+        assert_eq!(serde_json::to_value(place).unwrap(), place.name());
+    }
+    for sky in SkyKind::ALL {
+        assert_eq!(serde_json::to_value(sky).unwrap(), sky.name());
+    }
     // and the parameters say it all
     let scene = Scene::draw(5, 11, &fixed);
     let text = serde_json::to_string(&scene).unwrap();
