@@ -36,7 +36,8 @@ pub(super) struct Atmosphere {
     ozone: Spectrum,
     /// Lambert albedo of the ground.
     albedo: f32,
-    /// Light scattered more than once, as radiance per irradiance of the sun: `MS_HEIGHTS` × `MS_SUNS`.
+    /// Logarithm of the light scattered more than once, as radiance per irradiance of the sun: `MS_HEIGHTS` ×
+    /// `MS_SUNS`. It falls by orders of magnitude at dusk, which a straight line between two nodes would overstate.
     multiple: Vec<Spectrum>,
 }
 
@@ -145,7 +146,9 @@ impl Atmosphere {
         let (s, t) = (u - i as f32, v - j as f32);
         let at = |j: usize, i: usize| &self.multiple[j * MS_SUNS + i];
         let (a, b, c, d) = (at(j, i), at(j, i + 1), at(j + 1, i), at(j + 1, i + 1));
-        std::array::from_fn(|k| (1.0 - t) * (a[k] + s * (b[k] - a[k])) + t * (c[k] + s * (d[k] - c[k])))
+        std::array::from_fn(|k| {
+            ((1.0 - t) * (a[k] + s * (b[k] - a[k])) + t * (c[k] + s * (d[k] - c[k]))).exp()
+        })
     }
 
     fn multiple_scattering(&self) -> Vec<Spectrum> {
@@ -187,7 +190,7 @@ impl Atmosphere {
                 }
                 table.push(std::array::from_fn(|k| {
                     let (second, again) = (second[k] / DIRECTIONS as f32, again[k] / DIRECTIONS as f32);
-                    second / (1.0 - again.min(0.95))
+                    (second / (1.0 - again.min(0.95))).max(1e-20).ln()
                 }));
             }
         }
@@ -264,8 +267,8 @@ mod tests {
         for (column, exact) in up.iter().zip([RAYLEIGH_HEIGHT, MIE_HEIGHT, 15.0]) {
             assert!((column - exact).abs() < 3e-3 * exact, "{up:?}");
         }
-        // Kasten & Young (1989): 37.9 air masses at the horizon, 5.6 at 10° elevation
-        for (elevation, mass, tolerance) in [(0f64, 37.9, 2.0), (10.0, 5.59, 0.1), (30.0, 1.994, 0.02)] {
+        // √(πR/2H) at the horizon without refraction (Chapman 1931); Kasten & Young (1989) higher up
+        for (elevation, mass, tolerance) in [(0f64, 35.34, 0.1), (10.0, 5.59, 0.1), (30.0, 1.994, 0.02)] {
             let ours = columns(0.0, elevation.to_radians().sin())[0] / RAYLEIGH_HEIGHT;
             assert!((ours - mass).abs() < tolerance, "{elevation}°: {ours} air masses");
         }

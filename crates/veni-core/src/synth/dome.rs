@@ -119,8 +119,12 @@ mod tests {
             assert!(y < last && y > 0.0, "{elevation}°: {y} after {last}");
             last = y;
         }
-        // civil dusk: a few cd/m² at the zenith at −3°, orange towards the sun
-        let dusk = Dome::new(&air, at(-3.0), &SUN).radiance(at(1.0));
-        assert!(dusk.x > 1.5 * dusk.z, "{dusk}");
+
+        // orange towards the sun at sunset and after, blue overhead
+        for elevation in [0.5, -1.0, -3.0] {
+            let dusk = Dome::new(&air, at(elevation), &SUN);
+            let (low, high) = (dusk.radiance(at(2.0)), dusk.radiance(Vec3::Z));
+            assert!(low.x > 1.2 * low.z && high.z > 1.3 * high.x, "{elevation}°: {low} and {high}");
+        }
     }
 }

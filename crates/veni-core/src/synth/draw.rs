@@ -349,8 +349,8 @@ fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridge> {
     let wood = Ridge {
         kind: RidgeKind::Trees,
         distance,
-        height: draw.range(6.0, 17.0),
-        relief: draw.range(0.35, 0.95),
+        height: draw.range(6.0, 17.0) + if place == Place::Forest { 6.0 } else { 0.0 },
+        relief: draw.range(0.35, 0.95) * if place == Place::Forest { 0.4 } else { 1.0 },
         surface: Surface::Grass,
         snow_line: 1e5,
         seed: draw.bits(),

@@ -111,7 +111,7 @@ impl<'a> Stage<'a> {
             ));
         }
         // the ground below, in sun where the sky is open
-        let bounce = |visible: f32| albedo / PI * (sky * visible + direct * visible.sqrt());
+        let bounce = |visible: f32| albedo / PI * (sky * visible + direct * visible);
         for d in spiral(160) {
             open.push((-d, bounce(1.0)));
             near.push((-d, bounce(seen)));
