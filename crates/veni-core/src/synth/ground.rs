@@ -14,17 +14,33 @@ pub(super) struct Patch {
     pub(super) water: f32,
 }
 
+impl Patch {
+    fn times(self, share: f32) -> Self {
+        Self { albedo: share * self.albedo, normal: share * self.normal, water: share * self.water }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            albedo: self.albedo + other.albedo,
+            normal: self.normal + other.normal,
+            water: self.water + other.water,
+        }
+    }
+}
+
 impl Ground {
     /// The ground at a point (metres), averaged over `footprint` metres.
     pub(super) fn at(&self, p: Vec2, footprint: f32) -> Patch {
         let share = self.second_share(p, footprint);
-        let (first, second) =
-            (self.patch(self.surface, p, footprint, 0), self.patch(self.second, p, footprint, 1));
-        Patch {
-            albedo: self.tone * first.albedo.lerp(second.albedo, share),
-            normal: first.normal.lerp(second.normal, share).normalize(),
-            water: first.water + share * (second.water - first.water),
-        }
+        let first = |share: f32| self.patch(self.surface, p, footprint, 0).times(share);
+        let second = |share: f32| self.patch(self.second, p, footprint, 1).times(share);
+        // most places are one or the other
+        let mixed = match share {
+            0.0 => first(1.0),
+            1.0 => second(1.0),
+            _ => first(1.0 - share).plus(second(share)),
+        };
+        Patch { albedo: self.tone * mixed.albedo, normal: mixed.normal.normalize(), water: mixed.water }
     }
 
     /// Share of the second surface.

@@ -26,28 +26,53 @@ fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a + t * (b - a)
 }
 
-/// Gradients towards the sixteen (twelve distinct) middles of the edges of a cube.
-fn gradient(h: u32, x: f32, y: f32, z: f32) -> f32 {
-    let h = h & 15;
-    let u = if h < 8 { x } else { y };
-    let v = if h < 4 {
-        y
-    } else if h == 12 || h == 14 {
-        x
-    } else {
-        z
-    };
-    (if h & 1 == 0 { u } else { -u }) + (if h & 2 == 0 { v } else { -v })
+/// Gradients towards the middles of the edges of a cube, four of them twice so that there are sixteen.
+const EDGES: [[f32; 3]; 16] = [
+    [1.0, 1.0, 0.0],
+    [-1.0, 1.0, 0.0],
+    [1.0, -1.0, 0.0],
+    [-1.0, -1.0, 0.0],
+    [1.0, 0.0, 1.0],
+    [-1.0, 0.0, 1.0],
+    [1.0, 0.0, -1.0],
+    [-1.0, 0.0, -1.0],
+    [0.0, 1.0, 1.0],
+    [0.0, -1.0, 1.0],
+    [0.0, 1.0, -1.0],
+    [0.0, -1.0, -1.0],
+    [1.0, 1.0, 0.0],
+    [0.0, -1.0, 1.0],
+    [-1.0, 1.0, 0.0],
+    [0.0, -1.0, -1.0],
+];
+
+const HALF: f32 = std::f32::consts::FRAC_1_SQRT_2;
+/// Gradients in eight directions, all of one length.
+const COMPASS: [[f32; 2]; 8] = [
+    [1.0, 0.0],
+    [-1.0, 0.0],
+    [0.0, 1.0],
+    [0.0, -1.0],
+    [HALF, HALF],
+    [HALF, -HALF],
+    [-HALF, HALF],
+    [-HALF, -HALF],
+];
+
+/// Cell and place in it. The baseline instruction set has no rounding, and a call would cost more than all the rest.
+fn split(x: f32) -> (i32, f32) {
+    let cut = x as i32;
+    let cell = cut - i32::from(x < cut as f32);
+    (cell, x - cell as f32)
 }
 
 /// In about −1 to 1, mean 0, deviation about 0.27, one feature per unit.
 pub(super) fn noise3(p: Vec3, seed: u32) -> f32 {
-    let f = p.floor();
-    let (x, y, z) = (f.x as i32, f.y as i32, f.z as i32);
-    let d = p - f;
-    let (u, v, w) = (fade(d.x), fade(d.y), fade(d.z));
+    let ((x, a), (y, b), (z, c)) = (split(p.x), split(p.y), split(p.z));
+    let (u, v, w) = (fade(a), fade(b), fade(c));
     let corner = |i: i32, j: i32, k: i32| {
-        gradient(hash(x + i, y + j, z + k, seed), d.x - i as f32, d.y - j as f32, d.z - k as f32)
+        let [gx, gy, gz] = EDGES[(hash(x + i, y + j, z + k, seed) & 15) as usize];
+        gx * (a - i as f32) + gy * (b - j as f32) + gz * (c - k as f32)
     };
     let plane = |k: i32| {
         let low = lerp(corner(0, 0, k), corner(1, 0, k), u);
@@ -58,25 +83,11 @@ pub(super) fn noise3(p: Vec3, seed: u32) -> f32 {
 
 /// As [`noise3`], in the plane.
 pub(super) fn noise2(p: Vec2, seed: u32) -> f32 {
-    let f = p.floor();
-    let (x, y) = (f.x as i32, f.y as i32);
-    let d = p - f;
-    let (u, v) = (fade(d.x), fade(d.y));
+    let ((x, a), (y, b)) = (split(p.x), split(p.y));
+    let (u, v) = (fade(a), fade(b));
     let corner = |i: i32, j: i32| {
-        let h = hash(x + i, y + j, 0, seed);
-        let (a, b) = (d.x - i as f32, d.y - j as f32);
-        // eight directions, all of one length
-        const HALF: f32 = std::f32::consts::FRAC_1_SQRT_2;
-        match h & 7 {
-            0 => a,
-            1 => -a,
-            2 => b,
-            3 => -b,
-            4 => HALF * (a + b),
-            5 => HALF * (a - b),
-            6 => HALF * (b - a),
-            _ => -HALF * (a + b),
-        }
+        let [gx, gy] = COMPASS[(hash(x + i, y + j, 0, seed) & 7) as usize];
+        gx * (a - i as f32) + gy * (b - j as f32)
     };
     lerp(lerp(corner(0, 0), corner(1, 0), u), lerp(corner(0, 1), corner(1, 1), u), v)
 }
