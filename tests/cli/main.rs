@@ -14,5 +14,6 @@ mod prepare;
 mod readers;
 mod render_probe;
 mod shards;
+mod synth;
 mod training;
 mod util;

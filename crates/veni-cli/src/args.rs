@@ -44,6 +44,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     Bake(commands::bake::Bake),
     Sample(commands::sample::Sample),
+    Synth(commands::synth::Synth),
     #[cfg(feature = "learn")]
     Encode(commands::encode::Encode),
     #[cfg(feature = "learn")]

@@ -22,7 +22,7 @@ impl Loading {
         Self { report, current: Mutex::new(None) }
     }
 
-    /// `done` of `all` panoramas are read.
+    /// `done` of `all` panoramas are there.
     pub(crate) fn set(&self, done: usize, all: usize) {
         let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         // threads may overtake one another by a few panoramas; the next set falls back by more
@@ -38,7 +38,7 @@ impl Loading {
             && done > set.done
         {
             set.done = done;
-            set.bar.set(done as u64, || "reading".to_owned());
+            set.bar.set(done as u64, || "loading".to_owned());
         }
     }
 

@@ -3,7 +3,7 @@
 //! The **lighting world** is what a renderer embeds; it knows nothing of tensors or training:
 //! `sphere` (directions, frames, grids), [`panorama`] (HDR images), [`latent`] (the code),
 //! [`model`] (the weight file), [`field`] (the decoder folded for one latent), [`shade`] (surfaces under that
-//! light) and [`prepare`] (which panoramas are fit for training).
+//! light), [`prepare`] (which panoramas are fit for training) and [`synth`] (generated outdoor scenes).
 //!
 //! The **learning world** (feature `learn`, on by default) is built on burn: `nn` (equivariant
 //! layers), `vae` (encoder and decoder), `data`, `train`, `fit`, `eval` and `baseline`. It uses the
@@ -18,6 +18,7 @@ pub mod panorama;
 pub mod prepare;
 pub mod shade;
 pub mod sphere;
+pub mod synth;
 
 #[cfg(feature = "learn")]
 pub mod baseline;

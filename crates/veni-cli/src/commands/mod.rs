@@ -14,6 +14,7 @@ pub(crate) mod man;
 pub(crate) mod prepare;
 pub(crate) mod render_probe;
 pub(crate) mod sample;
+pub(crate) mod synth;
 #[cfg(feature = "learn")]
 pub(crate) mod train;
 
@@ -27,6 +28,7 @@ pub(crate) fn run(command: Command, report: Report) -> Result<Outcome> {
     match command {
         Command::Bake(c) => c.run(report),
         Command::Sample(c) => c.run(report),
+        Command::Synth(c) => c.run(report),
         #[cfg(feature = "learn")]
         Command::Encode(c) => c.run(report),
         #[cfg(feature = "learn")]

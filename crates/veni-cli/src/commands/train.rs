@@ -46,13 +46,19 @@ use watch::Watch;
         veni-cli train --resume --out runs/small\n  \
         veni-cli train --data hdri --pretrain skies ldr --pretrain-steps 20000 --out runs/two\n  \
         veni-cli train --data indoor --init runs/small --steps 3000 --out runs/indoor\n  \
+        veni-cli train --data hdri --synthetic 10000 --out runs/more   beside 10,000 generated scenes\n  \
         veni-cli train --data hdri --out runs/kld --set loss.kld=0.001 --set batch=8\n  \
         veni-cli train --config runs/small/config.toml --seed 2 --out runs/second"
 )]
 pub(crate) struct Train {
     /// Folders of panoramas (or files)
-    #[arg(long, value_name = "DIR", num_args = 1.., required_unless_present_any = ["resume", "config"])]
+    #[arg(long, value_name = "DIR", num_args = 1..,
+        required_unless_present_any = ["resume", "config", "synthetic"])]
     data: Vec<PathBuf>,
+
+    /// Also train on N generated scenes, as 'veni-cli synth' makes them, drawn with the run's seed
+    #[arg(long, value_name = "N")]
+    synthetic: Option<usize>,
 
     /// Folder of the run
     #[arg(long, short, value_name = "RUN")]

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::data::exposure::centre_exposure;
@@ -12,9 +13,11 @@ use crate::data::random::{Purpose, permutation, stream};
 use crate::panorama::Panorama;
 use crate::parallel::parallel;
 use crate::sphere::Equirect;
+use crate::synth::{Fixed, Scene, render};
 use crate::{Error, Result};
 
-/// Hears how far reading has come: panoramas read, and panoramas in all. Several threads tell it.
+/// Hears how far reading and generating have come: panoramas that are there, and panoramas in all. Several threads
+/// tell it.
 pub type Heard<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// Where panoramas come from and at which resolution they are used.
@@ -30,11 +33,13 @@ pub struct DataConfig {
     pub height: usize,
     /// Share of the panoramas that become validation where the folders do not say.
     pub val_share: f64,
+    /// Number of generated scenes ([`crate::synth`]) that training has beside them, drawn with the run's seed.
+    pub synthetic: usize,
 }
 
 impl Default for DataConfig {
     fn default() -> Self {
-        Self { folders: Vec::new(), width: 128, height: 64, val_share: 0.1 }
+        Self { folders: Vec::new(), width: 128, height: 64, val_share: 0.1, synthetic: 0 }
     }
 }
 
@@ -113,13 +118,7 @@ impl Dataset {
     /// # Errors
     /// As [`Dataset::load`].
     pub fn load_heard(files: &[PathBuf], grid: Equirect, heard: Heard<'_>) -> Result<Self> {
-        let done = AtomicUsize::new(0);
-        let items = parallel(files.len(), |at| {
-            let item = read_item(&files[at], grid)?;
-            heard(done.fetch_add(1, Ordering::Relaxed) + 1, files.len());
-            Ok(item)
-        })?;
-        Ok(Self::new(grid, items))
+        Ok(Self::new(grid, load(files, grid, heard)?))
     }
 
     /// Only the panoramas that are wanted.
@@ -152,7 +151,7 @@ impl Dataset {
 }
 
 impl Splits {
-    /// Reads what `config` names; `seed` decides the split where the folders do not.
+    /// Reads what `config` names; `seed` decides the split where the folders do not, and the generated scenes.
     ///
     /// # Errors
     /// [`Error::Invalid`] without folders or without any training panorama; otherwise as [`Dataset::load`].
@@ -165,7 +164,7 @@ impl Splits {
     /// # Errors
     /// As [`Splits::open`].
     pub fn open_heard(config: &DataConfig, seed: u64, heard: Heard<'_>) -> Result<Self> {
-        if config.folders.is_empty() {
+        if config.folders.is_empty() && config.synthetic == 0 {
             return Err(Error::invalid("no data: name at least one folder of EXR or HDR panoramas"));
         }
         if config.width < 2 || config.height < 2 || !(0.0..1.0).contains(&config.val_share) {
@@ -178,8 +177,10 @@ impl Splits {
         let (mut train, mut val, mut undecided) = (Vec::new(), Vec::new(), Vec::new());
         for folder in &config.folders {
             let [inner_train, inner_val] = ["train", "val"].map(|n| folder.join(n));
-            if inner_train.is_dir() {
-                train.extend(panorama_files(&inner_train)?);
+            if inner_train.is_dir() || (config.synthetic > 0 && inner_val.is_dir()) {
+                if inner_train.is_dir() {
+                    train.extend(panorama_files(&inner_train)?);
+                }
                 if inner_val.is_dir() {
                     val.extend(panorama_files(&inner_val)?);
                 }
@@ -194,19 +195,40 @@ impl Splits {
         }
         train.sort();
         val.sort();
-        if train.is_empty() {
+        if train.is_empty() && config.synthetic == 0 {
             let names: Vec<_> = config.folders.iter().map(|f| f.display().to_string()).collect();
             return Err(Error::invalid(format!(
                 "{}: no .exr or .hdr panorama to train on",
                 names.join(", ")
             )));
         }
-        let all = train.len() + val.len();
-        Ok(Self {
-            train: Dataset::load_heard(&train, grid, &|done, _| heard(done, all))?,
-            val: Dataset::load_heard(&val, grid, &|done, _| heard(train.len() + done, all))?,
-        })
+        let (files, all) = (train.len() + val.len(), train.len() + val.len() + config.synthetic);
+        let mut items = load(&train, grid, &|done, _| heard(done, all))?;
+        let val = Dataset::load_heard(&val, grid, &|done, _| heard(train.len() + done, all))?;
+        items.extend(generated(config.synthetic, seed, grid, &|done, _| heard(files + done, all)));
+        Ok(Self { train: Dataset::new(grid, items), val })
     }
+}
+
+fn load(files: &[PathBuf], grid: Equirect, heard: Heard<'_>) -> Result<Vec<Item>> {
+    let done = AtomicUsize::new(0);
+    parallel(files.len(), |at| {
+        let item = read_item(&files[at], grid)?;
+        heard(done.fetch_add(1, Ordering::Relaxed) + 1, files.len());
+        Ok(item)
+    })
+}
+
+/// Scenes 0..`count` of the set with this seed, in order.
+fn generated(count: usize, seed: u64, grid: Equirect, heard: Heard<'_>) -> Vec<Item> {
+    let done = AtomicUsize::new(0);
+    let make = |index: usize| {
+        let panorama = render(&Scene::draw(seed, index as u64, &Fixed::default()), grid);
+        let item = Item::new(Path::new(&format!("synth-{index:06}")), &panorama, grid);
+        heard(done.fetch_add(1, Ordering::Relaxed) + 1, count);
+        item
+    };
+    (0..count).into_par_iter().map(make).collect()
 }
 
 /// The `.exr` and `.hdr` files directly inside `folder`, sorted by name; a file stands for itself.
@@ -254,7 +276,7 @@ mod tests {
     }
 
     fn config(folder: &Path) -> DataConfig {
-        DataConfig { folders: vec![folder.to_path_buf()], width: 8, height: 4, val_share: 0.25 }
+        DataConfig { folders: vec![folder.to_path_buf()], width: 8, height: 4, val_share: 0.25, synthetic: 0 }
     }
 
     fn names(set: &Dataset) -> Vec<String> {
@@ -292,6 +314,29 @@ mod tests {
         assert!(crate::data::exposure::log_exposure(set.grid(), &item.log_radiance).abs() < 1e-5);
         // a mean luminance of about 0.2126·0.1 + 0.7152·1.5 + 0.0722·2
         assert!((item.log_exposure.exp() - 1.24).abs() < 0.15, "{}", item.log_exposure.exp());
+    }
+
+    #[test]
+    fn generated_scenes_follow_the_panoramas_and_the_seed() {
+        let folder = folder(&["train/a.exr", "val/b.exr"]);
+        let with = DataConfig { synthetic: 3, ..config(folder.path()) };
+        let splits = Splits::open(&with, 4).unwrap();
+        assert_eq!(names(&splits.train), ["a", "synth-000000", "synth-000001", "synth-000002"]);
+        assert_eq!(names(&splits.val), ["b"]);
+        assert_eq!(splits, Splits::open(&with, 4).unwrap());
+        assert_ne!(splits.train.items()[1], Splits::open(&with, 5).unwrap().train.items()[1]);
+        for item in &splits.train.items()[1..] {
+            assert!(item.log_radiance.iter().all(|v| v.is_finite()));
+            assert!(
+                crate::data::exposure::log_exposure(splits.train.grid(), &item.log_radiance).abs() < 1e-5
+            );
+        }
+        // alone, and beside a folder that only validates
+        fs::remove_dir_all(folder.path().join("train")).unwrap();
+        let alone = Splits::open(&with, 4).unwrap();
+        assert_eq!((alone.train.items(), names(&alone.val).len()), (&splits.train.items()[1..], 1));
+        let nothing = Splits::open(&DataConfig { folders: Vec::new(), ..with }, 4).unwrap();
+        assert!(nothing.val.is_empty() && nothing.train == alone.train);
     }
 
     #[test]

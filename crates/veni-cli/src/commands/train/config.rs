@@ -29,6 +29,9 @@ impl Train {
         if !self.data.is_empty() {
             config.data.folders = self.data.clone();
         }
+        if let Some(synthetic) = self.synthetic {
+            config.data.synthetic = synthetic;
+        }
         if let Some(seed) = self.seed {
             config.seed = seed;
         }
@@ -60,6 +63,7 @@ impl Train {
             || self.latent_vectors.is_some()
             || self.seed.is_some()
             || self.steps.is_some()
+            || self.synthetic.is_some()
             || self.device.is_some()
             || !self.set.is_empty();
         if !described && !changed {
@@ -129,6 +133,7 @@ impl Train {
             ("--seed", self.seed),
             ("--steps", self.steps),
             ("--pretrain-steps", self.pretrain_steps),
+            ("--synthetic", self.synthetic.map(|n| n as u64)),
         ];
         words.extend(numbers.into_iter().filter_map(|(name, n)| Some(format!("{name} {}", n?))));
         words.extend(self.set.iter().map(|set| format!("--set {}", shell_word(Path::new(set)))));

@@ -1,0 +1,108 @@
+//! The files of a set: what exists, what is missing, and how a scene is written.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use veni_core::Error;
+use veni_core::output::{Overwrite, refuse_existing};
+use veni_core::panorama::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions, attributes};
+use veni_core::sphere::Equirect;
+use veni_core::synth::Scene;
+
+use crate::output::writable;
+
+/// Attribute of a generated panorama: its parameters as JSON.
+const SCENE: &str = "veni:scene";
+/// Attribute: columns x rows.
+const SIZE: &str = "veni:size";
+/// Half precision is used so that the geometric mean of a scene comes out near this.
+const MIDDLE: f32 = 0.25;
+/// The largest power of two that leaves a finite half-precision number.
+const HALF_MAX: f32 = 65504.0;
+
+/// Where a set goes.
+pub(super) struct Files {
+    folder: PathBuf,
+    precision: Precision,
+    overwrite: Overwrite,
+    resume: bool,
+}
+
+impl Files {
+    /// Creates the folder; refuses files that exist unless they may be replaced or kept.
+    pub(super) fn open(
+        folder: &Path,
+        count: u64,
+        precision: Precision,
+        overwrite: Overwrite,
+        resume: bool,
+    ) -> Result<Self> {
+        let this = Self { folder: folder.to_path_buf(), precision, overwrite, resume };
+        if folder.is_dir() {
+            writable(folder, folder)?;
+            if !resume {
+                for index in 0..count {
+                    if let Err(e) = refuse_existing(&this.path(index), overwrite) {
+                        bail!("{e}, --resume keeps it and writes what is missing");
+                    }
+                }
+            }
+        } else if folder.exists() {
+            bail!("{}: is a file; name a folder", folder.display());
+        } else {
+            std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+        }
+        Ok(this)
+    }
+
+    fn path(&self, index: u64) -> PathBuf {
+        self.folder.join(format!("synth-{index:06}.exr"))
+    }
+
+    /// Whether a scene has still to be written. With `--resume` a file that exists must hold this very scene.
+    pub(super) fn wanted(&self, scene: &Scene, grid: Equirect) -> Result<bool> {
+        let path = self.path(scene.index);
+        if !self.resume || !path.exists() {
+            return Ok(true);
+        }
+        let found = attributes(&path)?;
+        if found.get(SCENE) == Some(&json(scene)?) && found.get(SIZE) == Some(&size(grid)) {
+            return Ok(false);
+        }
+        bail!(
+            "{}: is not of this set (another seed, size or option); name another folder, or --force replaces it",
+            path.display()
+        )
+    }
+
+    /// Writes one panorama, unless it was found already.
+    pub(super) fn write(&self, scene: &Scene, panorama: &Panorama) -> veni_core::Result<()> {
+        let path = self.path(scene.index);
+        if self.resume && path.exists() {
+            return Ok(());
+        }
+        let mut options = WriteOptions::new(WriteFormat::Exr(self.precision));
+        options.overwrite = self.overwrite;
+        if self.precision == Precision::Half {
+            options.half_range = HalfRange::Factor(scale(panorama));
+        }
+        options.attributes.insert(SCENE.to_owned(), json(scene)?);
+        options.attributes.insert(SIZE.to_owned(), size(panorama.grid()));
+        panorama.write(&path, &options)
+    }
+}
+
+fn json(scene: &Scene) -> veni_core::Result<String> {
+    serde_json::to_string(scene).map_err(|e| Error::invalid(format!("scene {}: {e}", scene.index)))
+}
+
+fn size(grid: Equirect) -> String {
+    format!("{}x{}", grid.width, grid.height)
+}
+
+/// The power of two that brings a scene into the middle of half precision without losing its brightest pixel.
+fn scale(panorama: &Panorama) -> f32 {
+    let brightest = panorama.pixels().as_flattened().iter().copied().fold(0f32, f32::max);
+    let wanted = (MIDDLE / panorama.mean_log_luminance().exp()).log2().round();
+    wanted.min((HALF_MAX / brightest).log2().floor()).exp2()
+}

@@ -1,0 +1,117 @@
+//! The ground plane: which surface lies where, its texture, and water.
+
+use glam::{Vec2, Vec3};
+
+use super::noise::fractal2;
+use super::scene::{Ground, Pattern, Surface};
+
+/// The ground at a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Patch {
+    pub(super) albedo: Vec3,
+    pub(super) normal: Vec3,
+    /// Share of water.
+    pub(super) water: f32,
+}
+
+impl Patch {
+    fn times(self, share: f32) -> Self {
+        Self { albedo: share * self.albedo, normal: share * self.normal, water: share * self.water }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            albedo: self.albedo + other.albedo,
+            normal: self.normal + other.normal,
+            water: self.water + other.water,
+        }
+    }
+}
+
+impl Ground {
+    /// The ground at a point (metres), averaged over `footprint` metres.
+    pub(super) fn at(&self, p: Vec2, footprint: f32) -> Patch {
+        let share = self.second_share(p, footprint);
+        let first = |share: f32| self.patch(self.surface, p, footprint, 0).times(share);
+        let second = |share: f32| self.patch(self.second, p, footprint, 1).times(share);
+        // most places are one or the other
+        let mixed = match share {
+            0.0 => first(1.0),
+            1.0 => second(1.0),
+            _ => first(1.0 - share).plus(second(share)),
+        };
+        Patch { albedo: self.tone * mixed.albedo, normal: mixed.normal.normalize(), water: mixed.water }
+    }
+
+    /// Share of the second surface.
+    fn second_share(&self, p: Vec2, footprint: f32) -> f32 {
+        let axis = Vec2::from_angle(self.bearing.to_radians());
+        let seed = self.seed ^ 0x5ec0;
+        let soft = |x: f32, width: f32| (0.5 + x / width.max(footprint)).clamp(0.0, 1.0);
+        match self.pattern {
+            Pattern::None => 0.0,
+            Pattern::Patches => soft(fractal2(p / 9.0, 4, 0.6, footprint / 9.0, seed) - 0.1, 0.25),
+            Pattern::Strip => {
+                let share = if self.surface == Surface::Paving { 1.0 } else { 0.7 };
+                let bend = 0.35 * fractal2(p / 14.0, 3, 0.5, footprint / 14.0, seed) * self.width.min(3.0);
+                share * soft(self.width - axis.perp_dot(p).abs() + bend, 0.3)
+            }
+            Pattern::Shore => {
+                let bend =
+                    fractal2(p / 30.0, 4, 0.5, footprint / 30.0, seed) * (4.0 + 0.25 * self.width.abs());
+                soft(axis.dot(p) - self.width + bend, 0.6)
+            }
+        }
+    }
+
+    fn patch(&self, surface: Surface, p: Vec2, footprint: f32, which: u32) -> Patch {
+        let (size, contrast) = surface.texture();
+        let seed = self.seed ^ (which.wrapping_mul(0x9e37));
+        if surface == Surface::Water {
+            return Patch { albedo: surface.albedo(), normal: self.waves(p, footprint), water: 1.0 };
+        }
+        let v = fractal2(p / size, 6, 0.85, footprint / size, seed);
+        let broad = fractal2(p / (9.0 * size), 3, 0.6, footprint / (9.0 * size), seed ^ 0xb4);
+        let slope = |k: u32| contrast * 0.6 * fractal2(p / size, 4, 0.7, footprint / size, seed ^ k);
+        let tint = Vec3::new(1.0 + 0.25 * contrast * broad, 1.0, 1.0 - 0.25 * contrast * broad);
+        Patch {
+            albedo: surface.albedo() * tint * (contrast * (v + 0.8 * broad)).exp(),
+            normal: Vec3::new(slope(1), slope(2), 1.0).normalize(),
+            water: 0.0,
+        }
+    }
+
+    /// Normal of the waves that a sample resolves.
+    fn waves(&self, p: Vec2, footprint: f32) -> Vec3 {
+        let slope = self.slope_deviation();
+        // waves are longer in stronger wind
+        let size = 0.6 + 0.35 * self.wind;
+        let n = |k: u32| 1.6 * slope * fractal2(p / size, 3, 0.7, footprint / size, self.seed ^ k);
+        Vec3::new(n(0x3a), n(0x3b), 1.0).normalize()
+    }
+
+    /// Deviation of the slope of waves along one axis (Cox & Munk 1954).
+    pub(super) fn slope_deviation(&self) -> f32 {
+        (0.5 * (0.003 + 0.005_12 * self.wind)).sqrt()
+    }
+
+    /// Radiance of the glitter of a source of irradiance 1: the microfacet form of Cox & Munk, shadowing left out.
+    /// Directions point away from the water.
+    pub(super) fn glitter(&self, to_eye: Vec3, to_source: Vec3) -> f32 {
+        let half = (to_eye + to_source).normalize_or(Vec3::Z);
+        if half.z <= 0.05 || to_eye.z <= 1e-3 {
+            return 0.0;
+        }
+        let variance = self.slope_deviation().powi(2);
+        let slope2 = (1.0 - half.z * half.z) / (half.z * half.z);
+        let density = (-0.5 * slope2 / variance).exp() / (2.0 * std::f32::consts::PI * variance);
+        // the rougher the sea and the lower the eye, the more of it waves hide
+        density * fresnel(half.dot(to_eye))
+            / (4.0 * (to_eye.z + 2.0 * variance.sqrt() * 0.3) * half.z.powi(4))
+    }
+}
+
+/// Reflectance of water (Schlick 1994).
+pub(super) fn fresnel(cosine: f32) -> f32 {
+    0.02 + 0.98 * (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
+}

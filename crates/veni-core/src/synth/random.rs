@@ -1,0 +1,83 @@
+//! Draws for scenes: streams named by (seed, index, what for), as everywhere in veni.
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// What a stream of one scene is for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Stream {
+    /// The parameters of the scene.
+    Scene,
+    /// Where things stand.
+    Layout,
+    /// Stars.
+    Stars,
+}
+
+/// A stream of random numbers with the draws that scenes need.
+pub(super) struct Draw(ChaCha8Rng);
+
+impl Draw {
+    pub(super) fn new(seed: u64, index: u64, stream: Stream) -> Self {
+        let mut key = [0; 32];
+        // the last word keeps these streams apart from those of training
+        for (bytes, word) in key.chunks_exact_mut(8).zip([seed, index, stream as u64, 0x5359_4e54_4853_4b59])
+        {
+            bytes.copy_from_slice(&word.to_le_bytes());
+        }
+        Self(ChaCha8Rng::from_seed(key))
+    }
+
+    /// Uniform in [0, 1).
+    pub(super) fn unit(&mut self) -> f32 {
+        (self.0.next_u32() >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
+    }
+
+    /// Uniform between two numbers.
+    pub(super) fn range(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Uniform in the logarithm.
+    pub(super) fn log_range(&mut self, low: f32, high: f32) -> f32 {
+        self.range(low.ln(), high.ln()).exp()
+    }
+
+    /// Normal with this mean and deviation.
+    pub(super) fn normal(&mut self, mean: f32, deviation: f32) -> f32 {
+        use rand_distr::{Distribution, StandardNormal};
+        let x: f32 = StandardNormal.sample(&mut self.0);
+        mean + deviation * x
+    }
+
+    pub(super) fn chance(&mut self, probability: f32) -> bool {
+        self.unit() < probability
+    }
+
+    pub(super) fn bits(&mut self) -> u32 {
+        self.0.next_u32()
+    }
+
+    /// A whole number, both ends included.
+    pub(super) fn count(&mut self, low: usize, high: usize) -> usize {
+        low + ((high - low + 1) as f32 * self.unit()) as usize
+    }
+
+    /// One of these, by weight.
+    pub(super) fn weighted<T: Copy>(&mut self, choices: &[(f32, T)]) -> T {
+        let total: f32 = choices.iter().map(|c| c.0).sum();
+        let mut at = self.unit() * total;
+        for (weight, choice) in choices {
+            at -= weight;
+            if at < 0.0 {
+                return *choice;
+            }
+        }
+        choices[choices.len() - 1].1
+    }
+
+    /// An azimuth in radians.
+    pub(super) fn azimuth(&mut self) -> f32 {
+        self.range(-std::f32::consts::PI, std::f32::consts::PI)
+    }
+}
