@@ -134,3 +134,31 @@ fn what_cannot_be_shared_out_is_refused() {
     let run = dir.run(&["encode", &inputs[0], "--model", model(), "--out-dir", "codes", "--shard", "3/4"]);
     assert!(run.code == Some(0) && run.out.is_empty() && run.err.contains("nothing to do"), "{}", run.err);
 }
+
+/// Scenes are inputs too; files that are prepared are examined in shards, and placed by one run that finds them done.
+#[test]
+fn scenes_and_training_folders_are_shared_out_too() {
+    let dir = Dir::new();
+    let synth = ["synth", "--count", "6", "--seed", "3", "--size", "32", "-q"];
+    dir.ok(&[&synth[..], &["-o", "whole"]].concat());
+    in_four(&dir, &[&synth[..], &["-o", "parts"]].concat());
+    let (whole, parts) = (files(&dir, "whole"), files(&dir, "parts"));
+    assert_eq!(whole.len(), 6);
+    assert!(whole == parts, "scenes differ");
+
+    let source = text(panoramas());
+    let prepare = ["prepare", &source, "--size", "32", "--resplit", "-q"];
+    dir.ok(&[&prepare[..], &["-o", "one"]].concat());
+    in_four(&dir, &[&prepare[..], &["-o", "four"]].concat());
+    let found = dir.files().into_iter().filter(|f| f.starts_with(dir.path("four/.prepare/images")));
+    assert_eq!(found.filter(|f| f.is_file()).count(), 16, "all examined, none placed");
+    dir.refused(&[&prepare[..], &["-o", "four", "--shard", "1/4", "--force"]].concat(), &["other shards"]);
+    dir.ok(&[&prepare[..], &["-o", "four"]].concat());
+    let placed = |folder| -> BTreeMap<_, _> {
+        let images = files(&dir, folder).into_iter();
+        images.filter(|(name, _)| name.extension().is_some_and(|e| e == "exr" || e == "png")).collect()
+    };
+    let (one, four) = (placed("one"), placed("four"));
+    assert_eq!(one.len(), 17, "{:?}", one.keys());
+    assert!(one == four, "{:?} {:?}", one.keys(), four.keys());
+}

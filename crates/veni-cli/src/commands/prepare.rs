@@ -19,6 +19,7 @@ use veni_core::sphere::Equirect;
 
 use crate::args::Force;
 use crate::report::{Outcome, Report};
+use crate::shard::Shard;
 use crate::size::Size;
 use place::Placing;
 use store::{Settings, Store};
@@ -82,6 +83,9 @@ pub(crate) struct Prepare {
     gamma: Option<f32>,
 
     #[command(flatten)]
+    shard: Shard,
+
+    #[command(flatten)]
     force: Force,
 }
 
@@ -115,8 +119,26 @@ impl Prepare {
         if found.sources.is_empty() {
             bail!("{}: no image files in there; name a folder that has some", scan::names(&self.inputs));
         }
-        let mut store = Store::open(&self.output, &settings, self.force.force)?;
-        work::examine_all(&mut store, &found.sources, &config, report)?;
+        if self.force.force && self.shard.is_part() {
+            bail!(
+                "--force would remove what other shards have done: begin anew without --shard, or remove {}",
+                self.output.display()
+            );
+        }
+        let mut store = Store::open(&self.output, &settings, self.force.force, self.shard)?;
+        let sources = self.shard.own(&found.sources);
+        self.shard.note_idle(found.sources.len(), report);
+        work::examine_all(&mut store, &sources, &config, report)?;
+        if self.shard.is_part() {
+            report.note(format_args!(
+                "shard {}: {} of {} files examined; when all shards are done, the same command without --shard places the \
+                 images",
+                self.shard,
+                sources.len(),
+                found.sources.len()
+            ));
+            return Ok(Outcome::Fine);
+        }
         let shares = Shares { val: self.val, test: self.test };
         let placing = Placing { shares, seed: self.seed, resplit: self.resplit };
         let placed = place::place(&mut store, &placing)?;

@@ -20,6 +20,7 @@ use crate::args::Force;
 use crate::output::{self, with_remedy};
 use crate::progress::{Progress, duration};
 use crate::report::{Outcome, Report};
+use crate::shard::Shard;
 use crate::sheet::Sheet;
 use crate::size::Size;
 use files::Files;
@@ -112,6 +113,9 @@ pub(crate) struct Synth {
     resume: bool,
 
     #[command(flatten)]
+    shard: Shard,
+
+    #[command(flatten)]
     force: Force,
 }
 
@@ -137,17 +141,21 @@ impl Synth {
         if !(1..=MAX_COUNT).contains(&self.count) {
             bail!("--count {}: give 1 to {MAX_COUNT}", self.count);
         }
+        self.shard.refuse("--sheet", self.sheet.is_some())?;
+        let own = || (0..self.count).filter(|index| self.shard.pick(*index as usize));
+        let count = own().count();
+        self.shard.note_idle(self.count as usize, report);
         let sheet = self.new_sheet(grid, overwrite)?;
         let files = match &self.output {
             Some(folder) => {
                 let precision = if self.float { Precision::Float } else { Precision::Half };
-                Some(Files::open(folder, self.count, precision, overwrite, self.resume)?)
+                Some(Files::open(folder, own(), precision, overwrite, self.resume)?)
             }
             None => None,
         };
         let cells = if sheet.is_some() { self.count.min(MAX_CELLS) } else { 0 };
         let kept = Mutex::new(0u64);
-        let shared = Mutex::new((sheet, Progress::start(report, "sky", 0, self.count), 0u64));
+        let shared = Mutex::new((sheet, Progress::start(report, "sky", 0, count as u64), 0u64));
         let finished = |index: u64, panorama: Option<&Panorama>| -> Result<()> {
             let mut shared = shared.lock().map_err(|_| anyhow!("a thread was lost"))?;
             let (sheet, progress, done) = &mut *shared;
@@ -166,6 +174,7 @@ impl Synth {
         // a file that is there already only counts; the sheet needs its picture all the same
         let failure = Mutex::new(None);
         let wanted = |scene: &Scene| match &files {
+            _ if !self.shard.pick(scene.index as usize) => false,
             Some(files) => match files.wanted(scene, grid) {
                 Ok(true) => true,
                 Ok(false) => {
@@ -202,7 +211,7 @@ impl Synth {
         if let (Some(sheet), Some(path)) = (sheet, &self.sheet) {
             sheet.write(path, overwrite).map_err(with_remedy)?;
         }
-        self.report(report, grid, kept, started)?;
+        self.report(report, grid, [count as u64, kept], started)?;
         Ok(Outcome::Fine)
     }
 
@@ -235,14 +244,20 @@ impl Synth {
         Ok(Some(Sheet::new(columns, rows, grid.width, grid.height)))
     }
 
-    fn report(&self, report: Report, grid: Equirect, kept: u64, started: Instant) -> Result<()> {
+    fn report(
+        &self,
+        report: Report,
+        grid: Equirect,
+        [count, kept]: [u64; 2],
+        started: Instant,
+    ) -> Result<()> {
         let shown = |path: &Option<PathBuf>| path.as_ref().map(|p| p.display().to_string());
         let places: Vec<_> = [shown(&self.output), shown(&self.sheet)].into_iter().flatten().collect();
         let already = if kept > 0 { format!(", {kept} of them there already") } else { String::new() };
         let human = format!(
             "{}: {} scenes of {} x {}, seed {}{already} ({})",
             places.join(", "),
-            self.count,
+            count,
             grid.width,
             grid.height,
             self.seed,
@@ -251,7 +266,7 @@ impl Synth {
         let value = json!({
             "folder": shown(&self.output),
             "sheet": shown(&self.sheet),
-            "count": self.count,
+            "count": count,
             "kept": kept,
             "seed": self.seed,
             "width": grid.width,

@@ -22,6 +22,7 @@ use veni_core::panorama::expand::ExpandOptions;
 use super::record::Record;
 use super::scan::Source;
 use crate::output::writable;
+use crate::shard::Shard;
 
 /// Changes when images, fingerprints or records of an older program can no longer be gone on with.
 const FORMAT: u32 = 1;
@@ -42,6 +43,7 @@ pub(super) struct Store {
     /// By the files' true names.
     records: BTreeMap<String, Record>,
     log: File,
+    log_path: PathBuf,
     /// Places of images, relative to the folder, by their id.
     plan: BTreeMap<String, Vec<String>>,
 }
@@ -60,15 +62,17 @@ impl Settings {
 impl Store {
     /// Opens the folder, or makes it. Refuses one that holds other things or was made with other settings; with
     /// `force` it removes what an earlier run wrote and begins anew.
-    pub(super) fn open(root: &Path, settings: &Settings, force: bool) -> Result<Self> {
+    pub(super) fn open(root: &Path, settings: &Settings, force: bool, shard: Shard) -> Result<Self> {
         let own = root.join(".prepare");
         if root.exists() && !root.is_dir() {
             bail!("{}: is a file; name a folder", root.display());
         }
         if !force && !own.is_dir() && root.is_dir() {
             let first = fs::read_dir(root).map_err(|e| Error::io(root, "list", e))?.next();
-            if let Some(entry) = first {
-                let name = entry.map_err(|e| Error::io(root, "list", e))?.file_name();
+            let first =
+                first.map(|entry| entry.map_err(|e| Error::io(root, "list", e)).map(|e| e.file_name()));
+            // another shard may have made it this very moment
+            if let Some(name) = first.transpose()?.filter(|name| name != ".prepare") {
                 bail!(
                     "{}: holds other things ({}) already; name a new folder, or add to this one with --force",
                     root.display(),
@@ -79,7 +83,7 @@ impl Store {
         create(root)?;
         writable(root, root)?;
         if force && own.is_dir() {
-            Self::read(root)?.clear()?;
+            Self::read(root, shard)?.clear()?;
         }
         create(&own.join("images"))?;
         let file = own.join("settings.json");
@@ -100,10 +104,10 @@ impl Store {
             }
             Err(_) => write_json(&file, settings)?,
         }
-        Self::read(root)
+        Self::read(root, shard)
     }
 
-    fn read(root: &Path) -> Result<Self> {
+    fn read(root: &Path, shard: Shard) -> Result<Self> {
         let own = root.join(".prepare");
         let mut records = BTreeMap::new();
         let mut logs: Vec<PathBuf> = fs::read_dir(&own)
@@ -119,7 +123,7 @@ impl Store {
                 records.insert(record.key.clone(), record);
             }
         }
-        let path = own.join("records.jsonl");
+        let path = own.join(log_name(shard));
         let mut log = OpenOptions::new().create(true).append(true).open(&path);
         if let Ok(file) = &mut log
             && file.metadata().is_ok_and(|m| m.len() > 0)
@@ -133,7 +137,7 @@ impl Store {
                 .with_context(|| format!("{}: damaged plan.json; begin anew with --force", own.display()))?,
             Err(_) => BTreeMap::new(),
         };
-        Ok(Self { root: root.to_path_buf(), records, log, plan })
+        Ok(Self { root: root.to_path_buf(), records, log, log_path: path, plan })
     }
 
     /// Removes all that was written here, and nothing else.
@@ -167,8 +171,7 @@ impl Store {
     pub(super) fn add(&mut self, record: Record) -> Result<()> {
         let mut line = serde_json::to_vec(&record)?;
         line.push(b'\n');
-        let path = self.root.join(".prepare/records.jsonl");
-        self.log.write_all(&line).map_err(|e| Error::io(&path, "write", e))?;
+        self.log.write_all(&line).map_err(|e| Error::io(&self.log_path, "write", e))?;
         self.records.insert(record.key.clone(), record);
         Ok(())
     }
@@ -224,6 +227,14 @@ impl Store {
         write_json(&self.root.join(".prepare/plan.json"), &plan)?;
         self.plan = plan;
         Ok(())
+    }
+}
+
+/// Each shard has a log of its own; a run without shards reads all.
+fn log_name(shard: Shard) -> String {
+    match shard.place() {
+        (_, 1) => "records.jsonl".to_owned(),
+        (at, of) => format!("records-{}-of-{of}.jsonl", at + 1),
     }
 }
 

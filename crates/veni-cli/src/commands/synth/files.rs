@@ -29,10 +29,10 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Creates the folder; refuses files that exist unless they may be replaced or kept.
+    /// Creates the folder; refuses files of `indices` that exist unless they may be replaced or kept.
     pub(super) fn open(
         folder: &Path,
-        count: u64,
+        mut indices: impl Iterator<Item = u64>,
         precision: Precision,
         overwrite: Overwrite,
         resume: bool,
@@ -41,10 +41,9 @@ impl Files {
         if folder.is_dir() {
             writable(folder, folder)?;
             if !resume {
-                for index in 0..count {
-                    if let Err(e) = refuse_existing(&this.path(index), overwrite) {
-                        bail!("{e}, --resume keeps it and writes what is missing");
-                    }
+                let refused = indices.find_map(|index| refuse_existing(&this.path(index), overwrite).err());
+                if let Some(e) = refused {
+                    bail!("{e}, --resume keeps it and writes what is missing");
                 }
             }
         } else if folder.exists() {
