@@ -139,21 +139,21 @@ fn what_cannot_be_shared_out_is_refused() {
 #[test]
 fn scenes_and_training_folders_are_shared_out_too() {
     let dir = Dir::new();
-    let synth = ["synth", "--count", "6", "--seed", "3", "--size", "32", "-q"];
-    dir.ok(&[&synth[..], &["-o", "whole"]].concat());
+    let synth = ["synth", "--count", "6", "--seed", "3", "--size", "32"];
+    dir.ok(&[&synth[..], &["-o", "whole", "-q"]].concat());
     in_four(&dir, &[&synth[..], &["-o", "parts"]].concat());
     let (whole, parts) = (files(&dir, "whole"), files(&dir, "parts"));
     assert_eq!(whole.len(), 6);
     assert!(whole == parts, "scenes differ");
 
     let source = text(panoramas());
-    let prepare = ["prepare", &source, "--size", "32", "--resplit", "-q"];
-    dir.ok(&[&prepare[..], &["-o", "one"]].concat());
+    let prepare = ["prepare", &source, "--size", "32", "--resplit"];
+    dir.ok(&[&prepare[..], &["-o", "one", "-q"]].concat());
     in_four(&dir, &[&prepare[..], &["-o", "four"]].concat());
     let found = dir.files().into_iter().filter(|f| f.starts_with(dir.path("four/.prepare/images")));
     assert_eq!(found.filter(|f| f.is_file()).count(), 16, "all examined, none placed");
     dir.refused(&[&prepare[..], &["-o", "four", "--shard", "1/4", "--force"]].concat(), &["other shards"]);
-    dir.ok(&[&prepare[..], &["-o", "four"]].concat());
+    dir.ok(&[&prepare[..], &["-o", "four", "-q"]].concat());
     let placed = |folder| -> BTreeMap<_, _> {
         let images = files(&dir, folder).into_iter();
         images.filter(|(name, _)| name.extension().is_some_and(|e| e == "exr" || e == "png")).collect()

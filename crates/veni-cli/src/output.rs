@@ -113,6 +113,9 @@ pub(crate) fn check_distinct(paths: &[PathBuf]) -> Result<()> {
     }
 }
 
+/// Begins the names of files that are made for a moment to see whether a folder takes any.
+pub(crate) const PROBE: &str = ".veni-cli-";
+
 /// Creates and removes an empty file: permissions alone do not say whether a file system is writable.
 pub(crate) fn writable(folder: &Path, wanted: &Path) -> Result<()> {
     match folder.metadata() {
@@ -125,7 +128,7 @@ pub(crate) fn writable(folder: &Path, wanted: &Path) -> Result<()> {
         }
         Ok(_) => {}
     }
-    let probe = folder.join(format!(".veni-cli-{:016x}.probe", process_token()));
+    let probe = folder.join(format!("{PROBE}{:016x}.probe", process_token()));
     match OpenOptions::new().write(true).create_new(true).open(&probe) {
         Ok(_) => {
             // an empty file that stays behind is not worth failing for

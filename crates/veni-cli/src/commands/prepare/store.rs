@@ -8,6 +8,7 @@
 //! | `plan.json` | where each image is, or is being moved: former places, then the wanted one |
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -21,7 +22,7 @@ use veni_core::panorama::expand::ExpandOptions;
 
 use super::record::Record;
 use super::scan::Source;
-use crate::output::writable;
+use crate::output::{PROBE, writable};
 use crate::shard::Shard;
 
 /// Changes when images, fingerprints or records of an older program can no longer be gone on with.
@@ -68,11 +69,15 @@ impl Store {
             bail!("{}: is a file; name a folder", root.display());
         }
         if !force && !own.is_dir() && root.is_dir() {
-            let first = fs::read_dir(root).map_err(|e| Error::io(root, "list", e))?.next();
-            let first =
-                first.map(|entry| entry.map_err(|e| Error::io(root, "list", e)).map(|e| e.file_name()));
-            // another shard may have made it this very moment
-            if let Some(name) = first.transpose()?.filter(|name| name != ".prepare") {
+            let list = |e| Error::io(root, "list", e);
+            let names = fs::read_dir(root).map_err(list)?.map(|entry| entry.map(|e| e.file_name()));
+            // another shard may have begun this very moment
+            let is_ours = |name: &OsString| {
+                let name = name.to_string_lossy();
+                name == ".prepare" || name.starts_with(PROBE)
+            };
+            let names = names.collect::<std::io::Result<Vec<_>>>().map_err(list)?;
+            if let Some(name) = names.into_iter().find(|name| !is_ours(name)) {
                 bail!(
                     "{}: holds other things ({}) already; name a new folder, or add to this one with --force",
                     root.display(),
