@@ -29,8 +29,9 @@ class Folded:
     # ---- encoder ----
 
     def encode(self, directions, log_radiance):
-        turning, still = self.so2(directions.transpose(2, 3)[:, :, :2], torch.cat(
-            [directions.transpose(2, 3)[:, :, 2:], log_radiance.transpose(2, 3)], 2), "encoder.project_in")
+        directions, log_radiance = directions.transpose(2, 3), log_radiance.transpose(2, 3)
+        still = torch.cat([directions[:, :, 2:], log_radiance], 2)
+        turning, still = self.so2(directions[:, :, :2], still, "encoder.project_in")
         invariant = self.weights["encoder.cls"].expand(turning.shape[0], 1, -1, -1)
         cls = torch.cat([torch.zeros_like(invariant[:, :, :2]), invariant], 2)
         x = torch.cat([cls, torch.cat([turning, still], 2)], 1)
@@ -102,10 +103,11 @@ class Folded:
         attention = [self.attention(told, index) for index in range(self.sizes.layers)]
         weight, bias = self.weights["decoder.input.weight"], self.weights["decoder.input.bias"]
         inputs = 4 * (n + 2)
-        linear = self.products(latent)
-        waves = torch.sin(basis @ self.arguments(linear))
+        products = self.products(latent)
+        waves = torch.sin(basis @ self.arguments(products))
         offset = F.pad((attention[0] + bias)[:, None], (0, 0, 4, 0))
-        x = torch.baddbmm(basis @ (linear @ weight[inputs:] + offset), waves, weight[:inputs].expand(len(latent), -1, -1))
+        plain = basis @ (products @ weight[inputs:] + offset)
+        x = torch.baddbmm(plain, waves, weight[:inputs].expand(len(latent), -1, -1))
         for index in range(self.sizes.layers):
             layer = f"decoder.layers.{index}"
             if index:
@@ -126,7 +128,7 @@ class Folded:
         return torch.cat([alpha * t * (1 - dropped), latent[..., 2:]], -1)
 
     def products(self, latent):
-        """The directional input (⟨z_xy, d_xy⟩ of every vector, d_z, |d_xy|) as a linear map of the basis: [B, 5, N + 2]."""
+        """The directional input (⟨z_xy, d_xy⟩ of every vector, d_z, |d_xy|), linear in the basis: [B, 5, N + 2]."""
         batch, n, _ = latent.shape
         horizontal = F.pad(latent[..., :2].transpose(1, 2), (0, 2))
         copies = torch.zeros(3, n + 2, dtype=latent.dtype)
@@ -134,11 +136,11 @@ class Folded:
         return torch.cat([horizontal, copies.expand(batch, -1, -1)], 1)
 
     @staticmethod
-    def arguments(linear):
+    def arguments(products):
         """2πfx and 2πfx + π/2, frequencies 1 and 4, as a linear map of the basis: [B, 5, 4(N + 2)]."""
-        frequencies = 2 * math.pi * torch.tensor([1.0, 4.0], dtype=linear.dtype)
-        waves = (linear[..., None] * frequencies).flatten(2)
-        quarter = torch.zeros(5, 1, dtype=linear.dtype)
+        frequencies = 2 * math.pi * torch.tensor([1.0, 4.0], dtype=products.dtype)
+        waves = (products[..., None] * frequencies).flatten(2)
+        quarter = torch.zeros(5, 1, dtype=products.dtype)
         quarter[4] = math.pi / 2
         return torch.cat([waves, waves + quarter], -1)
 
