@@ -53,8 +53,8 @@ class Corrected:
     def cosine(self, prediction, target):
         """Of linear RGB, over its largest channel so that nothing overflows."""
         p, i = ((x - x.detach().amax(-1, keepdim=True)).exp() for x in (prediction, target))
-        cosines = (p * i).sum(-1, keepdim=True) / (p.square().sum(-1, keepdim=True) * i.square().sum(-1, keepdim=True)).sqrt()
-        return ((1 - cosines) * self.rows).mean()
+        squares = p.square().sum(-1, keepdim=True) * i.square().sum(-1, keepdim=True)
+        return ((1 - (p * i).sum(-1, keepdim=True) / squares.sqrt()) * self.rows).mean()
 
     def ldr_mse(self, prediction, target):
         """Of what is displayed: over the target's 98 % quantile, clamped, sRGB curve."""

@@ -102,7 +102,7 @@ def markdown(summaries, options, version):
     """Tables for docs/RESULTS.md."""
     lines = [
         f"{options.pairs} pairs, {options.threads} threads, PyTorch {version}, form {options.form}, allocator of PyTorch "
-        f"{options.allocator}, a run's time is the median of its steps ({options.steps}); min / median / max over pairs.", "",
+        f"{options.allocator}, a run's time is the median of {options.steps} steps; min / median / max over pairs.", "",
         "| | seconds per step | per panorama | times ours | peak memory (of it the program as it starts) |",
         "|---|---|---|---|---|",
     ]
