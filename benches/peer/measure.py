@@ -26,6 +26,8 @@ REFERENCE = [
 ]
 # glibc gives large blocks back to the system and gets them page by page; ours does not use glibc's allocator
 ALLOCATOR = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": str(1 << 34), "MALLOC_TOP_PAD_": str(1 << 28)}
+# What `veni-cli train` sets for itself
+KEEP = {"MIMALLOC_PURGE_DELAY": "-1"}
 # Numbers on which the three programs must agree
 SAME = ("preset", "latent_vectors", "panoramas", "directions", "parameters")
 
@@ -40,7 +42,7 @@ def command(program, preset, latent_vectors, options, record=None):
 
 def environment(program, options):
     threads = {name: str(options.threads) for name in ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")}
-    tuned = ALLOCATOR if program != "ours" and options.allocator == "tuned" else {}
+    tuned = {} if options.allocator != "tuned" else KEEP if program == "ours" else ALLOCATOR
     return {**os.environ, **threads, **tuned}
 
 
