@@ -88,8 +88,9 @@ mod tests {
         assert_eq!(large, Measured::WouldTake(Duration::from_micros(50 * 1024 * 512)));
         assert_eq!(slow.bakes, bakes, "what is skipped is not begun");
         let mut all = Stopwatch { all: true, ..stopwatch };
+        slow.bakes = 0;
         let large = all.measure(&mut slow, Equirect::new(1024, 512)).unwrap();
         assert_eq!(large, Measured::Took(Duration::from_micros(50 * 1024 * 512)));
-        assert_eq!(slow.bakes, bakes + 1, "what takes long is done once");
+        assert_eq!(slow.bakes, 1, "what takes long is done once");
     }
 }
