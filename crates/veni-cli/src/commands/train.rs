@@ -45,6 +45,7 @@ use watch::Watch;
         veni-cli train --data hdri --system reni++ --preset small --out runs/reni\n  \
         veni-cli train --resume --out runs/small\n  \
         veni-cli train --data hdri --pretrain skies ldr --pretrain-steps 20000 --out runs/two\n  \
+        veni-cli train --data hdri --pretrain-synthetic 5000 --out runs/three\n  \
         veni-cli train --data indoor --init runs/small --steps 3000 --out runs/indoor\n  \
         veni-cli train --data hdri --synthetic 10000 --out runs/more   beside 10,000 generated scenes\n  \
         veni-cli train --data hdri --out runs/kld --set loss.kld=0.001 --set batch=8\n  \
@@ -74,8 +75,12 @@ pub(crate) struct Train {
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "config")]
     pretrain: Vec<PathBuf>,
 
-    /// Number of updates on the panoramas of --pretrain [default: as many as follow]
-    #[arg(long, value_name = "N", requires = "pretrain", value_parser = clap::value_parser!(u64).range(1..))]
+    /// The same with N generated scenes, alone or beside the panoramas of --pretrain
+    #[arg(long, value_name = "N", conflicts_with = "config")]
+    pretrain_synthetic: Option<usize>,
+
+    /// Number of updates of --pretrain and --pretrain-synthetic [default: as many as follow]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pretrain_steps: Option<u64>,
 
     /// What is trained [default: veni]

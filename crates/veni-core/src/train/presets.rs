@@ -105,17 +105,20 @@ impl Preset {
 const FINE: f64 = 10.0;
 
 impl TrainConfig {
-    /// The same run behind a stage `pretrain` of `steps` updates on other panoramas; its own updates become the stage
-    /// `finetune`, with a tenth of the learning rates.
+    /// The same run behind a stage `pretrain` of `steps` updates on other panoramas and so many generated scenes; its own
+    /// updates become the stage `finetune`, with a tenth of the learning rates.
     ///
     /// # Errors
     /// [`Error::Invalid`] if it has stages already, or is an auto-decoder's.
-    pub fn pretrained_on(mut self, folders: &[PathBuf], steps: u64) -> Result<Self> {
+    pub fn pretrained_on(mut self, folders: &[PathBuf], synthetic: usize, steps: u64) -> Result<Self> {
         if let Some(first) = self.stage.first() {
             return Err(Error::invalid(format!("the run has a stage {} already", first.name)));
         }
         let folders = folders.iter().map(|folder| Value::String(folder.display().to_string())).collect();
-        let data = Table::from_iter([("folders".to_owned(), Value::Array(folders))]);
+        let data = Table::from_iter([
+            ("folders".to_owned(), Value::Array(folders)),
+            ("synthetic".to_owned(), Value::Integer(synthetic as i64)),
+        ]);
         let pretrain = Table::from_iter([("data".to_owned(), Value::Table(data))]);
         let finetune = self.groups().into_iter().map(|(name, group)| (name.to_owned(), lowered(group)));
         let (own, finetune) = (self.steps, finetune.collect());

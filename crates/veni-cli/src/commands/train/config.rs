@@ -44,19 +44,28 @@ impl Train {
         if let Some(init) = &self.init {
             config.init = Some(InitConfig { model: source::model_file(init)?, digest: None });
         }
-        if !self.pretrain.is_empty() {
-            let steps = self.pretrain_steps.unwrap_or(config.steps);
-            config = config.pretrained_on(&self.pretrain, steps).context("--pretrain")?;
+        if self.pretrains() {
+            let (steps, scenes) = (self.pretrain_steps.unwrap_or(config.steps), self.pretrain_synthetic);
+            config =
+                config.pretrained_on(&self.pretrain, scenes.unwrap_or(0), steps).context("--pretrain")?;
+        } else if self.pretrain_steps.is_some() {
+            bail!(
+                "--pretrain-steps: there is nothing to pre-train on; give --pretrain or --pretrain-synthetic"
+            );
         }
         let config = config.with_overrides(&self.set).context("--set")?;
         config.check()?;
         Ok(config)
     }
 
+    fn pretrains(&self) -> bool {
+        !self.pretrain.is_empty() || self.pretrain_synthetic.is_some()
+    }
+
     /// With `--resume`: whatever else was typed must be what the run was begun with.
     pub(super) fn check_same(&self, stored: &Path) -> Result<()> {
         let described = !self.data.is_empty() || self.config.is_some();
-        let begun = self.init.is_some() || !self.pretrain.is_empty();
+        let begun = self.init.is_some() || self.pretrains() || self.pretrain_steps.is_some();
         let changed = begun
             || self.system.is_some()
             || self.preset.is_some()
@@ -132,6 +141,7 @@ impl Train {
             ("--latent-vectors", self.latent_vectors.map(|n| n as u64)),
             ("--seed", self.seed),
             ("--steps", self.steps),
+            ("--pretrain-synthetic", self.pretrain_synthetic.map(|n| n as u64)),
             ("--pretrain-steps", self.pretrain_steps),
             ("--synthetic", self.synthetic.map(|n| n as u64)),
         ];

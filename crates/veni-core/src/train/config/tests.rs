@@ -153,10 +153,11 @@ fn pretraining_is_a_stage_before_with_ten_times_the_rates() {
         let mut config = preset.config(9);
         config.data.folders = vec!["real".into()];
         let own = config.clone();
-        let two = config.pretrained_on(&["ldr".into(), "skies".into()], 50_000).unwrap();
+        let two = config.pretrained_on(&["ldr".into(), "skies".into()], 7, 50_000).unwrap();
         let [first, second] = &two.stages().unwrap()[..] else { panic!("two stages") };
         assert_eq!(two.steps, 50_000 + own.steps);
         assert_eq!(first.config.data.folders, ["ldr", "skies"].map(std::path::PathBuf::from));
+        assert_eq!((first.config.data.synthetic, own.data.synthetic), (7, 0));
         assert_eq!(second.config.data, own.data);
         for (group, before) in second.config.groups().into_iter().zip(own.groups()) {
             for step in [300, own.steps] {
@@ -168,9 +169,9 @@ fn pretraining_is_a_stage_before_with_ten_times_the_rates() {
             panic!("a cosine")
         };
         assert!(preset != Preset::Paper || rate == 1e-5, "the authors' rate: {rate}");
-        assert!(two.pretrained_on(&["ldr".into()], 1).unwrap_err().to_string().contains("pretrain"));
+        assert!(two.pretrained_on(&["ldr".into()], 0, 1).unwrap_err().to_string().contains("pretrain"));
     }
-    assert!(Preset::Tiny.auto_decoder(3).pretrained_on(&["ldr".into()], 1).is_err());
+    assert!(Preset::Tiny.auto_decoder(3).pretrained_on(&["ldr".into()], 0, 1).is_err());
 }
 
 #[test]

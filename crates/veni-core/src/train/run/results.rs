@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::*;
+use crate::data::DataConfig;
 use crate::data::coarsen::{averaged, coarse_grid};
 use crate::data::random::{Purpose, stream};
 use crate::eval::metrics::Alignment;
@@ -126,15 +127,23 @@ impl Trainer {
 
     /// The data in words: the panoramas of the run, then those of each stage that has its own.
     fn describe_data(&self) -> String {
-        let names = |folders: &[PathBuf]| {
-            let names = folders.iter().filter_map(|folder| folder.file_name());
-            names.map(|name| name.to_string_lossy().into_owned()).collect::<Vec<_>>().join(", ")
+        let described = |count: Option<usize>, data: &DataConfig| {
+            let names = data.folders.iter().filter_map(|folder| folder.file_name());
+            let names = names.map(|name| name.to_string_lossy().into_owned()).collect::<Vec<_>>().join(", ");
+            let photographed = match count {
+                Some(0) => None,
+                Some(count) => Some(format!("{count} panoramas of {names}")),
+                None => (!names.is_empty()).then_some(names),
+            };
+            let generated = (data.synthetic > 0).then(|| format!("{} generated scenes", data.synthetic));
+            photographed.into_iter().chain(generated).collect::<Vec<_>>().join(" and ")
         };
-        let own = format!("{} panoramas of {}", self.splits.train.len(), names(&self.config.data.folders));
+        let data = &self.config.data;
+        let own = described(Some(self.splits.train.len().saturating_sub(data.synthetic)), data);
         let stages = self.stages.iter().filter(|running| running.stage.own_data);
         let stages = stages.map(|Running { stage, .. }| {
             let name = stage.name.as_deref().unwrap_or_default();
-            format!("; {name}: {}", names(&stage.config.data.folders))
+            format!("; {name}: {}", described(None, &stage.config.data))
         });
         std::iter::once(own).chain(stages).collect()
     }
