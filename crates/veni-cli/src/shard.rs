@@ -2,7 +2,6 @@
 
 use std::fmt::{self, Display};
 
-#[cfg(feature = "learn")]
 use anyhow::{Result, bail};
 use clap::Args;
 
@@ -50,10 +49,7 @@ impl Shard {
             report.note(format_args!("--shard {self}: nothing to do, with so few inputs ({inputs})"));
         }
     }
-}
 
-#[cfg(feature = "learn")]
-impl Shard {
     /// Whether other processes do the rest.
     pub(crate) fn is_part(self) -> bool {
         self.part.is_some_and(|part| part.of > 1)
