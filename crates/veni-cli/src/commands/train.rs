@@ -57,7 +57,8 @@ pub(crate) struct Train {
         required_unless_present_any = ["resume", "config", "synthetic"])]
     data: Vec<PathBuf>,
 
-    /// Also train on N generated scenes, as 'veni-cli synth' makes them, drawn with the run's seed
+    /// Also train on N generated scenes, as 'veni-cli synth' makes them, drawn with the run's seed; how often one is
+    /// drawn follows from the numbers, or is set by --set data.synthetic_share=0.5
     #[arg(long, value_name = "N")]
     synthetic: Option<usize>,
 

@@ -35,11 +35,21 @@ pub struct DataConfig {
     pub val_share: f64,
     /// Number of generated scenes ([`crate::synth`]) that training has beside them, drawn with the run's seed.
     pub synthetic: usize,
+    /// Share of the draws that are generated scenes, in [0, 1]; absent: their share of the panoramas.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub synthetic_share: Option<f64>,
 }
 
 impl Default for DataConfig {
     fn default() -> Self {
-        Self { folders: Vec::new(), width: 128, height: 64, val_share: 0.1, synthetic: 0 }
+        Self {
+            folders: Vec::new(),
+            width: 128,
+            height: 64,
+            val_share: 0.1,
+            synthetic: 0,
+            synthetic_share: None,
+        }
     }
 }
 
@@ -52,6 +62,8 @@ pub struct Item {
     pub log_radiance: Vec<f32>,
     /// What was subtracted: the solid-angle-weighted mean of ln(luminance).
     pub log_exposure: f32,
+    /// Whether it is a generated scene ([`crate::synth`]).
+    pub generated: bool,
 }
 
 impl Item {
@@ -59,7 +71,7 @@ impl Item {
     pub fn new(path: &Path, panorama: &Panorama, grid: Equirect) -> Self {
         let mut log_radiance = panorama.resample(grid).log().into_flattened();
         let log_exposure = centre_exposure(grid, &mut log_radiance);
-        Self { path: path.to_path_buf(), log_radiance, log_exposure }
+        Self { path: path.to_path_buf(), log_radiance, log_exposure, generated: false }
     }
 
     /// File name without extension.
@@ -202,6 +214,20 @@ impl Splits {
                 names.join(", ")
             )));
         }
+        if let Some(share) = config.synthetic_share {
+            if !(0.0..=1.0).contains(&share) || config.synthetic == 0 {
+                return Err(Error::invalid(format!(
+                    "data.synthetic_share = {share} with data.synthetic = {}: needs a share in 0..=1 and generated scenes",
+                    config.synthetic
+                )));
+            }
+            if train.is_empty() && share < 1.0 {
+                return Err(Error::invalid(format!(
+                    "data.synthetic_share = {share}: there is no .exr or .hdr panorama to take the other {} from",
+                    1.0 - share
+                )));
+            }
+        }
         let (files, all) = (train.len() + val.len(), train.len() + val.len() + config.synthetic);
         let mut items = load(&train, grid, &|done, _| heard(done, all))?;
         let val = Dataset::load_heard(&val, grid, &|done, _| heard(train.len() + done, all))?;
@@ -224,7 +250,8 @@ fn generated(count: usize, seed: u64, grid: Equirect, heard: Heard<'_>) -> Vec<I
     let done = AtomicUsize::new(0);
     let make = |index: usize| {
         let panorama = render(&Scene::draw(seed, index as u64, &Fixed::default()), grid);
-        let item = Item::new(Path::new(&format!("synth-{index:06}")), &panorama, grid);
+        let path = format!("synth-{index:06}");
+        let item = Item { generated: true, ..Item::new(Path::new(&path), &panorama, grid) };
         heard(done.fetch_add(1, Ordering::Relaxed) + 1, count);
         item
     };
@@ -276,7 +303,13 @@ mod tests {
     }
 
     fn config(folder: &Path) -> DataConfig {
-        DataConfig { folders: vec![folder.to_path_buf()], width: 8, height: 4, val_share: 0.25, synthetic: 0 }
+        DataConfig {
+            folders: vec![folder.to_path_buf()],
+            width: 8,
+            height: 4,
+            val_share: 0.25,
+            ..DataConfig::default()
+        }
     }
 
     fn names(set: &Dataset) -> Vec<String> {
@@ -331,10 +364,20 @@ mod tests {
                 crate::data::exposure::log_exposure(splits.train.grid(), &item.log_radiance).abs() < 1e-5
             );
         }
+        let marks = |set: &Dataset| set.items().iter().map(|item| item.generated).collect::<Vec<_>>();
+        assert_eq!((marks(&splits.train), marks(&splits.val)), (vec![false, true, true, true], vec![false]));
+        let share = |share, synthetic| DataConfig { synthetic_share: Some(share), synthetic, ..with.clone() };
+        assert!(Splits::open(&share(0.5, 3), 4).is_ok());
+        for (refused, word) in [(share(1.5, 3), "0..=1"), (share(0.5, 0), "generated scenes")] {
+            let message = Splits::open(&refused, 4).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
+        }
         // alone, and beside a folder that only validates
         fs::remove_dir_all(folder.path().join("train")).unwrap();
         let alone = Splits::open(&with, 4).unwrap();
         assert_eq!((alone.train.items(), names(&alone.val).len()), (&splits.train.items()[1..], 1));
+        let message = Splits::open(&share(0.5, 3), 4).unwrap_err().to_string();
+        assert!(message.contains("the other 0.5"), "{message}");
         let nothing = Splits::open(&DataConfig { folders: Vec::new(), ..with }, 4).unwrap();
         assert!(nothing.val.is_empty() && nothing.train == alone.train);
     }

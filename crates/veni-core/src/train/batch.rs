@@ -1,10 +1,11 @@
 //! What one step works on, prepared on the host while the previous step computes.
 
 use crate::data::coarsen::averaged;
-use crate::data::random::{Purpose, below, normal, permutation, stream, uniform};
+use crate::data::random::{Purpose, below, normal, stream, uniform};
 use crate::data::{AugmentConfig, Dataset};
 use crate::sphere::{Equirect, Stripes};
-use crate::train::config::{LossGrid, Order, TrainConfig};
+use crate::train::config::{LossGrid, TrainConfig};
+use crate::train::draws::Draws;
 
 /// The numbers of one step, row-major, channels last.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +59,7 @@ impl Batch {
 pub struct Batches<'a> {
     train: &'a Dataset,
     augment: AugmentConfig,
-    order: Order,
+    draws: Draws,
     loss_grid: LossGrid,
     seed: u64,
     batch: usize,
@@ -73,7 +74,7 @@ impl<'a> Batches<'a> {
         Self {
             train,
             augment: config.augment.clone(),
-            order: config.order,
+            draws: Draws::new(config, train),
             loss_grid: config.loss_grid,
             seed: config.seed,
             batch: config.batch,
@@ -98,7 +99,7 @@ impl<'a> Batches<'a> {
             noise: Vec::with_capacity(3 * self.batch * self.latent_vectors),
         };
         for slot in 0..self.batch {
-            let image = self.augmented(self.choice(step, slot), step, slot as u64);
+            let image = self.augmented(self.draws.choice(step, slot), step, slot as u64);
             let yaw = std::f64::consts::TAU
                 * uniform(&mut stream(self.seed, Purpose::Sampling, step, 1 + slot as u64));
             // the grid is turned, not the image: samples and directions lie at −yaw, in the image's own frame
@@ -123,19 +124,7 @@ impl<'a> Batches<'a> {
         let mut rng = stream(self.seed, Purpose::Augment, step, slot);
         let image = &items[index].log_radiance;
         self.augment
-            .apply(self.train.grid(), image, &mut rng, |rng| &items[below(rng, items.len())].log_radiance)
-    }
-
-    fn choice(&self, step: u64, slot: usize) -> usize {
-        let n = self.train.len();
-        match self.order {
-            Order::Replacement => below(&mut stream(self.seed, Purpose::Order, step, slot as u64), n),
-            Order::Shuffle => {
-                let drawn = (step - 1) as usize * self.batch + slot;
-                permutation(&mut stream(self.seed, Purpose::Order, (drawn / n) as u64, u64::MAX), n)
-                    [drawn % n]
-            }
-        }
+            .apply(self.train.grid(), image, &mut rng, |rng| &items[self.draws.partner(rng)].log_radiance)
     }
 }
 

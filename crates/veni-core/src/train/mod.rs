@@ -4,6 +4,7 @@
 pub mod batch;
 pub mod checkpoint;
 pub mod config;
+mod draws;
 pub mod init;
 pub mod latents;
 mod log;

@@ -1,8 +1,9 @@
 //! What one step of an auto-decoder works on: rays of some panoramas.
 
 use crate::data::Dataset;
-use crate::data::random::{Purpose, below, normal, permutation, stream, uniform};
-use crate::train::config::{Order, TrainConfig};
+use crate::data::random::{Purpose, below, normal, stream, uniform};
+use crate::train::config::TrainConfig;
+use crate::train::draws::Draws;
 
 /// The numbers of one step, row-major, channels last.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +29,7 @@ pub struct RayBatch {
 #[derive(Debug)]
 pub struct RayBatches<'a> {
     train: &'a Dataset,
-    order: Order,
+    draws: Draws,
     seed: u64,
     batch: usize,
     rays: usize,
@@ -49,7 +50,7 @@ impl<'a> RayBatches<'a> {
         });
         Self {
             train,
-            order: config.order,
+            draws: Draws::new(config, train),
             seed: config.seed,
             batch: config.batch,
             rays: rays / config.batch,
@@ -64,7 +65,7 @@ impl<'a> RayBatches<'a> {
         let count = 3 * self.batch * self.rays;
         let mut batch = RayBatch {
             step,
-            panoramas: (0..self.batch).map(|slot| self.choice(step, slot)).collect(),
+            panoramas: (0..self.batch).map(|slot| self.draws.choice(step, slot)).collect(),
             rays: self.rays,
             directions: Vec::with_capacity(count),
             target: Vec::with_capacity(count),
@@ -85,18 +86,6 @@ impl<'a> RayBatches<'a> {
         }
         batch
     }
-
-    fn choice(&self, step: u64, slot: usize) -> usize {
-        let n = self.train.len();
-        match self.order {
-            Order::Replacement => below(&mut stream(self.seed, Purpose::Order, step, slot as u64), n),
-            Order::Shuffle => {
-                let drawn = (step - 1) as usize * self.batch + slot;
-                permutation(&mut stream(self.seed, Purpose::Order, (drawn / n) as u64, u64::MAX), n)
-                    [drawn % n]
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -114,6 +103,7 @@ mod tests {
             path: format!("{k}.exr").into(),
             log_radiance: (0..grid.len()).flat_map(|p| [p as f32, 0.0, k as f32]).collect(),
             log_exposure: 0.0,
+            generated: false,
         };
         let train = Dataset::new(grid, (0..3).map(item).collect());
         let config = Preset::Tiny.auto_decoder(3);

@@ -135,7 +135,11 @@ impl Trainer {
                 Some(count) => Some(format!("{count} panoramas of {names}")),
                 None => (!names.is_empty()).then_some(names),
             };
-            let generated = (data.synthetic > 0).then(|| format!("{} generated scenes", data.synthetic));
+            let generated = (data.synthetic > 0).then(|| {
+                let share =
+                    data.synthetic_share.map(|share| format!(" ({:.0} % of the draws)", 100.0 * share));
+                format!("{} generated scenes{}", data.synthetic, share.unwrap_or_default())
+            });
             photographed.into_iter().chain(generated).collect::<Vec<_>>().join(" and ")
         };
         let data = &self.config.data;
@@ -169,13 +173,17 @@ impl Trainer {
     }
 
     /// Latents and variances of the training panoramas and `copies` augmented copies of each; of a large set of
-    /// [`PRIOR_PANORAMAS`], evenly spread.
+    /// [`PRIOR_PANORAMAS`], evenly spread. Generated scenes count only where there is nothing else: a random sky shall
+    /// be like the photographed ones.
     fn encoded(&self, veni: &Veni, copies: usize) -> Result<(Vec<Latent>, Vec<Vec<f32>>)> {
         let train = &self.splits.train;
         let batches = Batches::new(&self.config, veni.stripes()?, train);
-        let chosen = train.len().min(PRIOR_PANORAMAS);
-        let chosen: Vec<_> = (0..chosen).map(|at| at * train.len() / chosen).collect();
-        let copies = if train.len() > PRIOR_PANORAMAS { copies.min(1) } else { copies };
+        let photographed = train.items().iter().filter(|item| !item.generated).count();
+        let from = if photographed == 0 { train.len() } else { photographed };
+        let chosen = from.min(PRIOR_PANORAMAS);
+        // photographs come first
+        let chosen: Vec<_> = (0..chosen).map(|at| at * from / chosen).collect();
+        let copies = if from > PRIOR_PANORAMAS { copies.min(1) } else { copies };
         let (mut codes, mut variances) = (Vec::new(), Vec::new());
         for copy in 0..=copies {
             for chosen in chosen.chunks(CHUNK) {
