@@ -10,10 +10,9 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use veni_core::eval::codec::Codec;
 use veni_core::eval::lpips::{self, Lpips};
-use veni_core::eval::protocol::paper::{self, Published};
 use veni_core::eval::protocol::{
-    Evaluation, Report as Findings, Settings, Share, ablations, consistency, dataset_size, equivariance,
-    interpolation, inverse_rendering, reconstruction, uniqueness,
+    Evaluation, Published, Report as Findings, Settings, Share, ablations, consistency, dataset_size,
+    equivariance, interpolation, inverse_rendering, paper, reconstruction, uniqueness,
 };
 use veni_core::eval::store::Store;
 use veni_core::eval::table::{Format, Table};
@@ -108,7 +107,8 @@ pub(crate) struct Evaluate {
     #[arg(long, value_name = "COUNT", default_value = "9")]
     frames: usize,
 
-    /// Numbers of the article to stand beside ours (paper): JSON {table: {row: {column: number}}}
+    /// More numbers of the articles to stand beside ours (paper): JSON {table: {row: {column: number}}}; VENI's LDR
+    /// PSNR is known
     #[arg(long, value_name = "FILE")]
     published: Option<PathBuf>,
 

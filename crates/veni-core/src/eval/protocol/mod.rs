@@ -22,6 +22,7 @@ pub mod equivariance;
 pub mod interpolation;
 pub mod inverse_rendering;
 pub mod paper;
+mod published;
 mod quality;
 pub mod reconstruction;
 mod share;
@@ -32,6 +33,7 @@ mod work;
 
 use std::path::{Path, PathBuf};
 
+pub use published::Published;
 pub use share::Share;
 
 use super::codec::{Autoencoder, Codec, Optimised};

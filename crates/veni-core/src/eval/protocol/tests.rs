@@ -19,7 +19,11 @@ use crate::vae::Veni;
 const GRID: Equirect = Equirect { width: 32, height: 16 };
 
 fn model(seed: u64) -> Model {
-    let config = Preset::Tiny.config(3).model;
+    model_of(3, seed)
+}
+
+fn model_of(latent_vectors: usize, seed: u64) -> Model {
+    let config = Preset::Tiny.config(latent_vectors).model;
     let veni = Veni::new(&config, &mut stream(seed, Purpose::Weights, 0, 0), &Device::flex()).unwrap();
     veni.to_model(&config, ModelInfo::default()).unwrap()
 }
@@ -267,7 +271,7 @@ fn training_set_sizes_come_from_the_files() {
 fn the_paper_is_all_of_it() {
     let (folder, data) = (tempfile::tempdir().unwrap(), skies(2));
     let both = [subject("one", 1), subject("two", 2)];
-    let published = paper::Published::default();
+    let published = Published::default();
     let (report, computed) =
         evaluated(folder.path(), &both, &data, quick(), |run| paper::run(run, &published).unwrap());
     assert!(computed > 0);
@@ -290,6 +294,18 @@ fn the_paper_is_all_of_it() {
         report.tables[0].cell("one", "LDR PSNR (ref.)").and_then(Cell::number)
     );
     assert!(report.tables[0].notes.iter().any(|n| n.contains("No table of training set sizes")));
+}
+
+#[test]
+fn the_article_stands_beside_models_of_its_sizes() {
+    let sized = |n| Subject::new(format!("N{n}"), model_of(n, 1), &Device::flex()).unwrap();
+    let known: Published =
+        serde_json::from_str(r#"{"reconstruction": {"N9, optimised": {"LDR PSNR (ref.)": 20.5}}}"#).unwrap();
+    let expected: Published = serde_json::from_str(
+        r#"{"reconstruction": {"N9, optimised": {"LDR PSNR (ref.)": 20.5}, "N9, autoencoder": {"LDR PSNR (ref.)": 18.78}}}"#,
+    )
+    .unwrap();
+    assert_eq!(known.with_article(&[sized(9), sized(3)]), expected);
 }
 
 #[test]
