@@ -131,9 +131,9 @@ impl Cloud {
         let mut v = if d.stretch > 1.5 {
             // fibres bend
             let bend = fractal2(q * 0.6, 2, 0.5, footprint * 0.6, d.seed ^ 0x51);
-            fractal2(q + Vec2::new(0.0, 0.7 * bend), octaves, 0.62, footprint, d.seed)
+            fractal2(q + Vec2::new(0.0, 0.7 * bend), octaves, 0.52, footprint, d.seed)
         } else {
-            fractal2(q, octaves, if octaves > 3 { 0.62 } else { 0.5 }, footprint, d.seed)
+            fractal2(q, octaves, if octaves > 3 { 0.52 } else { 0.5 }, footprint, d.seed)
         };
         if d.cells > 0.0 {
             let cells = fractal2(q * 7.0, 2, 0.4, footprint * 7.0, d.seed ^ 0xce11);
@@ -157,10 +157,10 @@ impl Cloud {
         }
         let size = 2.6 / d.scale;
         let q = Vec3::new(p.x * size, p.y * size, level * d.thickness * size * 1.3);
-        let lumps = billows3(q, if fine { 3 } else { 1 }, d.seed ^ 0xb1);
+        let lumps = billows3(q, if fine { 2 } else { 1 }, d.seed ^ 0xb1);
         let rim = (level * 9.0).min(1.0);
         let top = ((rise + most * lumps).max(0.0) / 0.9).powf(2.0 / 3.0).min(1.0);
-        (((inside + most * lumps) * 2.5).clamp(0.0, 1.0) * rim, top)
+        (((inside + most * lumps) * 1.8).clamp(0.0, 1.0) * rim, top)
     }
 
     /// Distance to height `h` along a ray with sine `up` of its elevation, km.

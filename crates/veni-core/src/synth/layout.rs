@@ -50,7 +50,7 @@ pub(super) fn layout(scene: &Scene) -> Layout {
     let mut builder = Builder {
         draw: Draw::new(scene.seed, scene.index, Stream::Layout),
         lit: scene.lit,
-        snow: scene.ground.surface == super::scene::Surface::Snow,
+        snow: scene.ground.surface == super::surface::Surface::Snow,
         bearing: Vec2::from_angle(scene.ground.bearing.to_radians()),
         layout: Layout::default(),
     };

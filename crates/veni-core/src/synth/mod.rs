@@ -40,7 +40,9 @@ mod sky;
 mod solid;
 mod spectrum;
 mod stage;
+mod surface;
 mod terrain;
+mod view;
 
 #[cfg(test)]
 mod tests;
@@ -49,4 +51,5 @@ pub use cloud::{Deck, DeckKind};
 pub use draw::Fixed;
 pub use generate::generate;
 pub use render::render;
-pub use scene::{Ground, Moon, Pattern, Place, Ridge, RidgeKind, Scene, SkyKind, Surface};
+pub use scene::{Moon, Place, Ridge, RidgeKind, Scene, SkyKind};
+pub use surface::{Ground, Pattern, Surface};
