@@ -94,7 +94,7 @@ impl Scene {
         let sun_elevation = fixed.sun_elevation.unwrap_or(elevation);
         let azimuth = draw.azimuth().to_degrees();
         let haze = draw.normal(0.0, 0.4).exp();
-        let turbidity = (if sky == SkyKind::Overcast { 4.0 } else { 3.0 } * haze).clamp(1.7, 9.0);
+        let turbidity = (if sky == SkyKind::Overcast { 4.0 } else { 2.6 } * haze).clamp(1.7, 9.0);
         let clouds = clouds(draw, sky, fixed.cloud_cover);
         let moon = moon(draw, sun_elevation);
         let settled =
@@ -108,7 +108,7 @@ impl Scene {
         }
         let ridges = ridges(draw, place, &ground);
         // what the camera leaves of a coloured cast: it takes the light of noon as white, more or less
-        let cast = draw.normal(-0.22, 0.16);
+        let cast = draw.normal(-0.28, 0.17);
         let tint = draw.normal(0.0, 0.03);
         let white = [(0.4 * cast).exp(), tint.exp(), (-0.8 * cast).exp()];
         let mut scene = Self {

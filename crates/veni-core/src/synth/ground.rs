@@ -87,7 +87,7 @@ impl Ground {
         let slope = |k: u32| contrast * 0.6 * fractal2(p / size, 4, 0.7, footprint / size, seed ^ k);
         let tint = Vec3::new(1.0 + 0.25 * contrast * broad, 1.0, 1.0 - 0.25 * contrast * broad);
         Patch {
-            albedo: surface.albedo() * tint * (contrast * (0.8 * v + 1.1 * broad + 0.9 * vast + tiles)).exp(),
+            albedo: surface.albedo() * tint * (contrast * (0.8 * v + 1.2 * broad + 1.2 * vast + tiles)).exp(),
             normal: Vec3::new(slope(1), slope(2), 1.0).normalize(),
             water: 0.0,
         }

@@ -9,7 +9,8 @@ use glam::{Vec2, Vec3};
 
 use super::random::{Draw, Stream};
 use super::scene::{Place, Scene};
-use super::solid::{Shape, Skin, Solid};
+use super::skin::Skin;
+use super::solid::{Shape, Solid};
 
 /// Leaves overhead, as a layer with holes.
 #[derive(Clone, Copy, Debug)]

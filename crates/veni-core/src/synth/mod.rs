@@ -26,6 +26,7 @@
 mod ambient;
 mod atmosphere;
 mod cloud;
+mod deck;
 mod disc;
 mod dome;
 mod draw;
@@ -36,6 +37,7 @@ mod noise;
 mod random;
 mod render;
 mod scene;
+mod skin;
 mod sky;
 mod solid;
 mod spectrum;
@@ -47,7 +49,7 @@ mod view;
 #[cfg(test)]
 mod tests;
 
-pub use cloud::{Deck, DeckKind};
+pub use deck::{Deck, DeckKind};
 pub use draw::Fixed;
 pub use generate::generate;
 pub use render::render;

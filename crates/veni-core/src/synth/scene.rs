@@ -4,7 +4,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::cloud::Deck;
+use super::deck::Deck;
 use super::surface::{Ground, Surface};
 
 /// All parameters of a scene; [`super::render`] is a function of these alone.

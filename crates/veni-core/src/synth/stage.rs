@@ -10,8 +10,9 @@ use super::ambient::Ambient;
 use super::layout::{Lamp, layout};
 use super::noise::fractal2;
 use super::scene::Scene;
+use super::skin::Skin;
 use super::sky::{Sky, spiral};
-use super::solid::{Hit, Skin};
+use super::solid::Hit;
 use super::spectrum::luminance;
 use super::view::{Thing, View};
 
@@ -174,12 +175,13 @@ impl<'a> Stage<'a> {
         let point = eye + hit.distance * direction;
         let solid = &self.view.solids.all[hit.solid];
         let normal = if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal };
-        let (albedo, shine, mirror) = solid.paint(point, hit.normal, footprint * hit.distance);
+        let (albedo, shine, mirror) =
+            solid.skin.paint(point, hit.normal, footprint * hit.distance, solid.seed);
         let (front, back) = self.irradiance(point, normal, |_| 1.0);
         let mut out = if let Skin::Leaves { .. } = solid.skin {
             // leaves face all ways, let light through, and shade each other more the deeper they sit
             let deep =
-                if hit.normal.dot(direction) > 0.0 { 0.5 } else { 0.65 + 0.3 * hit.normal.z.max(-0.6) };
+                if hit.normal.dot(direction) > 0.0 { 0.5 } else { 0.55 + 0.3 * hit.normal.z.max(-0.6) };
             let through = Vec3::new(0.8, 1.0, 0.35);
             albedo / PI * (front * deep + 0.5 * through * back)
         } else {
@@ -206,7 +208,7 @@ impl<'a> Stage<'a> {
         let direct: Vec3 = self.sources.iter().map(|(e, d)| *e * d.z.max(0.0)).sum();
         let through = Vec3::new(0.75, 1.0, 0.3);
         let below = self.near.at(-Vec3::Z);
-        let above = (direct + self.open.at(Vec3::Z)) * 0.08 * dense;
+        let above = (direct + self.open.at(Vec3::Z)) * 0.035 * dense;
         let own = canopy / PI * (below + through * above);
         self.sky.through_air(own, direction, point.length() * 1e-3)
     }

@@ -72,14 +72,14 @@ impl Surface {
     /// Albedo under daylight: typical values of field measurements (ECOSTRESS and USGS spectral libraries).
     pub(super) fn albedo(self) -> Vec3 {
         match self {
-            Self::Grass => Vec3::new(0.062, 0.082, 0.034),
+            Self::Grass => Vec3::new(0.064, 0.081, 0.030),
             Self::DryGrass => Vec3::new(0.20, 0.165, 0.105),
             Self::Soil => Vec3::new(0.15, 0.115, 0.085),
             Self::Sand => Vec3::new(0.38, 0.32, 0.24),
-            Self::Rock => Vec3::new(0.22, 0.205, 0.19),
+            Self::Rock => Vec3::new(0.225, 0.205, 0.175),
             Self::Snow => Vec3::new(0.80, 0.82, 0.85),
-            Self::Asphalt => Vec3::new(0.095, 0.095, 0.095),
-            Self::Paving => Vec3::new(0.25, 0.24, 0.225),
+            Self::Asphalt => Vec3::new(0.099, 0.095, 0.088),
+            Self::Paving => Vec3::new(0.258, 0.24, 0.21),
             Self::Leaves => Vec3::new(0.12, 0.085, 0.055),
             Self::Water => Vec3::new(0.018, 0.03, 0.035),
         }

@@ -1,6 +1,6 @@
 //! Which clouds a sky has.
 
-use crate::synth::cloud::{Deck, DeckKind};
+use crate::synth::deck::{Deck, DeckKind};
 use crate::synth::random::Draw;
 use crate::synth::scene::SkyKind;
 

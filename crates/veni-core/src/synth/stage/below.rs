@@ -10,6 +10,8 @@ use crate::synth::scene::Place;
 
 /// Variance of the slopes of ground that shines.
 const SHEEN_VARIANCE: f32 = 0.06;
+/// Sine of the depression below which a mirrored sky has lost all detail.
+const BROAD_BELOW: f32 = 0.5;
 
 impl Stage<'_> {
     pub(super) fn ground(
@@ -73,15 +75,21 @@ impl Stage<'_> {
     fn mirrored_sky(&self, direction: Vec3, footprint: f32, jitter: f32) -> Vec3 {
         let down = -direction.z;
         let up = Vec3::new(direction.x, direction.y, down);
-        let (across, along) = up.any_orthonormal_pair();
-        let blur = 0.04 + 0.5 * down;
-        let mut sum = Vec3::ZERO;
-        for k in 0..4 {
-            let (s, c) = (std::f32::consts::TAU * (k as f32 + jitter) / 4.0).sin_cos();
-            let turned = up + blur * (c * across + s * along);
-            sum += self.sky.radiance(turned.with_z(turned.z.abs()).normalize(), footprint + blur, jitter);
+        let dim = 1.0 - 0.82 * down;
+        // far down nothing but the broadest features is left
+        let broad = (down / BROAD_BELOW).min(1.0);
+        let mut out = broad * self.open.at(up.with_z(down + 0.2).normalize()) / PI;
+        if broad < 1.0 {
+            let (across, along) = up.any_orthonormal_pair();
+            let blur = 0.04 + 0.4 * down;
+            for k in 0..4 {
+                let (s, c) = (std::f32::consts::TAU * (k as f32 + jitter) / 4.0).sin_cos();
+                let turned = up + blur * (c * across + s * along);
+                let turned = turned.with_z(turned.z.abs()).normalize();
+                out += 0.25 * (1.0 - broad) * self.sky.radiance(turned, footprint + blur, jitter);
+            }
         }
-        0.25 * (1.0 - 0.72 * down) * sum
+        dim * out
     }
 
     /// What water shows: things near the shore in the plane of the ray, else the sky.
