@@ -76,15 +76,15 @@ impl Scene {
         let sky = fixed.sky.unwrap_or(sky);
         let place = draw.weighted(&[
             (0.21, Place::PureSky),
-            (0.16, Place::Plain),
-            (0.09, Place::Hills),
+            (0.12, Place::Plain),
+            (0.08, Place::Hills),
             (0.04, Place::Coast),
             (0.04, Place::Lake),
-            (0.09, Place::Park),
+            (0.10, Place::Park),
             (0.07, Place::Forest),
-            (0.05, Place::Village),
+            (0.06, Place::Village),
             (0.08, Place::Street),
-            (0.10, Place::Square),
+            (0.12, Place::Square),
             (0.02, Place::Courtyard),
             (0.03, Place::Rocks),
             (0.03, Place::Shelter),
@@ -94,7 +94,7 @@ impl Scene {
         let sun_elevation = fixed.sun_elevation.unwrap_or(elevation);
         let azimuth = draw.azimuth().to_degrees();
         let haze = draw.normal(0.0, 0.4).exp();
-        let turbidity = (if sky == SkyKind::Overcast { 4.0 } else { 2.6 } * haze).clamp(1.7, 9.0);
+        let turbidity = (if sky == SkyKind::Overcast { 4.0 } else { 2.45 } * haze).clamp(1.7, 9.0);
         let clouds = clouds(draw, sky, fixed.cloud_cover);
         let moon = moon(draw, sun_elevation);
         let settled =
@@ -151,7 +151,7 @@ impl Scene {
 }
 
 /// Share of scenes by day whose viewer stands in the sun if he can.
-const SUN_SOUGHT: f32 = 0.7;
+const SUN_SOUGHT: f32 = 0.6;
 
 fn elevation(draw: &mut Draw, sky: SkyKind) -> f32 {
     // one draw in every case, so that what follows stays the same when the sky is fixed

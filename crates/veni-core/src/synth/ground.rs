@@ -152,3 +152,36 @@ pub(super) fn glitter(variance: f32, to_eye: Vec3, to_source: Vec3) -> f32 {
 pub(super) fn fresnel(cosine: f32) -> f32 {
     0.02 + 0.98 * (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::{Fixed, Place, Scene};
+
+    #[test]
+    fn patterns_vanish_at_a_distance_and_rough_ground_is_darker_against_the_light() {
+        let plain = Scene::draw(1, 2, &Fixed { place: Some(Place::Plain), ..Fixed::default() }).ground;
+        let rows = Ground {
+            surface: Surface::Paving,
+            second: Surface::Grass,
+            pattern: Pattern::Rows,
+            width: 0.8,
+            roughness: 0.5,
+            hollow: 0.4,
+            ..plain
+        };
+        let across = Vec2::from_angle(rows.bearing.to_radians()).perp();
+        let deviation = |footprint: f32| {
+            let values: Vec<f32> =
+                (0..64).map(|k| rows.at(0.13 * k as f32 * across, footprint).albedo.y.ln()).collect();
+            let mean = values.iter().sum::<f32>() / 64.0;
+            (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / 64.0).sqrt()
+        };
+        let [near, far] = [0.05, 400.0].map(deviation);
+        assert!(near > 0.25 && far < 1e-3, "{near} {far}");
+        let low = Vec3::new(0.9, 0.0, 0.436);
+        let [with, against] = [1.0, -1.0].map(|x| rows.facing(Vec3::new(0.9 * x, 0.0, 0.436), low));
+        assert!(with > 1.2 && against < 0.85 && against > 0.0, "{with} {against}");
+        assert!((rows.depths(-1.0) - 0.6).abs() < 1e-6 && rows.depths(0.0) == 1.0);
+    }
+}

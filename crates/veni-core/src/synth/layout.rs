@@ -116,8 +116,8 @@ impl Builder {
             }
             Place::Street => self.street(fullness),
             Place::Square => {
-                let radius = self.draw.log_range(16.0, 50.0);
-                self.ring(radius, [6.0, 26.0], 0.92);
+                let radius = self.draw.log_range(14.0, 45.0);
+                self.ring(radius, [7.0, 26.0], 0.92);
                 self.trees(many(0.0, 8.0), 6.0, 0.7 * radius);
                 self.vehicles(many(0.0, 8.0), 5.0, 0.7 * radius);
                 self.lamp_posts(many(3.0, 9.0), 5.0, 0.8 * radius);

@@ -72,10 +72,10 @@ impl Surface {
     /// Albedo under daylight: typical values of field measurements (ECOSTRESS and USGS spectral libraries).
     pub(super) fn albedo(self) -> Vec3 {
         match self {
-            Self::Grass => Vec3::new(0.064, 0.081, 0.030),
-            Self::DryGrass => Vec3::new(0.20, 0.165, 0.105),
-            Self::Soil => Vec3::new(0.15, 0.115, 0.085),
-            Self::Sand => Vec3::new(0.38, 0.32, 0.24),
+            Self::Grass => Vec3::new(0.066, 0.081, 0.028),
+            Self::DryGrass => Vec3::new(0.205, 0.165, 0.098),
+            Self::Soil => Vec3::new(0.16, 0.115, 0.078),
+            Self::Sand => Vec3::new(0.39, 0.32, 0.225),
             Self::Rock => Vec3::new(0.225, 0.205, 0.175),
             Self::Snow => Vec3::new(0.80, 0.82, 0.85),
             Self::Asphalt => Vec3::new(0.099, 0.095, 0.088),
