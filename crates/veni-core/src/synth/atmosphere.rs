@@ -5,7 +5,9 @@
 //! Shirley & Smits (SIGGRAPH 1999): optical depth at the zenith β λ^−1.3, λ in µm, β = 0.04608 T − 0.04586.
 //! Lengths are kilometres.
 
-use std::sync::OnceLock;
+mod columns;
+
+use columns::{Columns, columns, densities};
 
 use super::spectrum::{BANDS, OZONE, Spectrum, WAVELENGTHS};
 
@@ -21,9 +23,6 @@ pub(super) const MIE_HEIGHT: f32 = 1.2;
 const MIE_ALBEDO: f32 = 0.92;
 /// Angular radius of the sun, radians: 6.8e-5 sr.
 pub(super) const SUN_RADIUS: f64 = 0.004_652;
-
-/// Distances through molecules, aerosol and ozone in kilometres of their density at sea level (ozone: at its peak).
-type Columns = [f32; 3];
 
 /// The atmosphere of a scene.
 #[derive(Clone, Debug)]
@@ -196,64 +195,6 @@ impl Atmosphere {
         }
         table
     }
-}
-
-/// Densities relative to those that the coefficients are for.
-fn densities(height: f32) -> Columns {
-    let ozone = (1.0 - (height - 25.0).abs() / 15.0).max(0.0);
-    [(-height / RAYLEIGH_HEIGHT).exp(), (-height / MIE_HEIGHT).exp(), ozone]
-}
-
-const HEIGHTS: usize = 40;
-const ANGLES: usize = 128;
-
-/// Columns from `height` to the top of the atmosphere at zenith cosine `mu` (not below the horizon). They do not
-/// depend on the scene, so one table serves all; its axes are those of Bruneton & Neyret.
-fn columns(height: f64, mu: f64) -> Columns {
-    static TABLE: OnceLock<Vec<Columns>> = OnceLock::new();
-    let table = TABLE.get_or_init(tabulate);
-    let r = GROUND + height.clamp(0.0, TOP - GROUND);
-    let widest = (TOP * TOP - GROUND * GROUND).sqrt();
-    let rho = (r * r - GROUND * GROUND).max(0.0).sqrt();
-    let distance = -r * mu + (r * r * (mu * mu - 1.0) + TOP * TOP).max(0.0).sqrt();
-    let (near, far) = (TOP - r, rho + widest);
-    let u = ((distance - near) / (far - near)).clamp(0.0, 1.0) * (ANGLES - 1) as f64;
-    let v = rho / widest * (HEIGHTS - 1) as f64;
-    let (i, j) = ((u as usize).min(ANGLES - 2), (v as usize).min(HEIGHTS - 2));
-    let (s, t) = ((u - i as f64) as f32, (v - j as f64) as f32);
-    let (a, b) = (&table[j * ANGLES + i..], &table[(j + 1) * ANGLES + i..]);
-    std::array::from_fn(|k| {
-        (1.0 - t) * (a[0][k] + s * (a[1][k] - a[0][k])) + t * (b[0][k] + s * (b[1][k] - b[0][k]))
-    })
-}
-
-fn tabulate() -> Vec<Columns> {
-    const STEPS: usize = 400;
-    let widest = (TOP * TOP - GROUND * GROUND).sqrt();
-    let mut table = Vec::with_capacity(HEIGHTS * ANGLES);
-    for j in 0..HEIGHTS {
-        let rho = widest * j as f64 / (HEIGHTS - 1) as f64;
-        let r = (rho * rho + GROUND * GROUND).sqrt();
-        let (near, far) = (TOP - r, rho + widest);
-        for i in 0..ANGLES {
-            let distance = near + (far - near) * i as f64 / (ANGLES - 1) as f64;
-            let mu = if distance < 1e-9 {
-                1.0
-            } else {
-                ((widest * widest - rho * rho - distance * distance) / (2.0 * r * distance)).clamp(-1.0, 1.0)
-            };
-            let mut sum = [0f64; 3];
-            for k in 0..STEPS {
-                let edge = |k: usize| distance * (k as f64 / STEPS as f64).powi(2);
-                let t = 0.5 * (edge(k) + edge(k + 1));
-                let h = ((r * r + 2.0 * r * mu * t + t * t).sqrt() - GROUND).max(0.0);
-                let length = edge(k + 1) - edge(k);
-                sum.iter_mut().zip(densities(h as f32)).for_each(|(s, d)| *s += length * f64::from(d));
-            }
-            table.push(sum.map(|s| s as f32));
-        }
-    }
-    table
 }
 
 #[cfg(test)]

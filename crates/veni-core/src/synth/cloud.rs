@@ -6,11 +6,13 @@
 //! with g = 0.85 (Bohren, Am. J. Phys. 1987), light scattered once from Henyey–Greenstein lobes. The brightness of a
 //! closed sheet over elevation γ follows Moon & Spencer (1942), (1 + 2 sin γ).
 
+mod sheet;
+
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
-use serde::{Deserialize, Serialize};
 
+use super::deck::{Deck, DeckKind};
 use super::dome::henyey_greenstein;
 use super::noise::{billows3, fractal2};
 
@@ -20,44 +22,6 @@ const EARTH: f32 = 6360.0;
 const DIFFUSION: f32 = 0.11;
 /// Samples of a ray inside a heap.
 const STEPS: usize = 10;
-
-/// Whether a deck has height.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DeckKind {
-    /// Cumulus and stratocumulus: flat bases, rising tops.
-    Heap,
-    /// Cirrus, altocumulus, altostratus and stratus: a layer without height.
-    Sheet,
-}
-
-/// One deck of cloud.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Deck {
-    /// Heap or sheet.
-    pub kind: DeckKind,
-    /// Height of the base, km.
-    pub base: f32,
-    /// From the base to the highest tops, km.
-    pub thickness: f32,
-    /// Share of the deck that is cloud, 0 to 1.
-    pub cover: f32,
-    /// Vertical optical depth where it is dense.
-    pub depth: f32,
-    /// Size of the largest features, km.
-    pub scale: f32,
-    /// Features are this many times longer along the wind than across.
-    pub stretch: f32,
-    /// Bearing of the wind, radians.
-    pub wind: f32,
-    /// How ragged the edges and how uneven the sheets are, 0 to 1.
-    pub ragged: f32,
-    /// How much of it falls apart into small cells (altocumulus), 0 to 1.
-    pub cells: f32,
-    /// Seed of its noise.
-    pub seed: u32,
-}
 
 /// What lights a deck.
 #[derive(Clone, Copy, Debug)]
@@ -131,9 +95,9 @@ impl Cloud {
         let mut v = if d.stretch > 1.5 {
             // fibres bend
             let bend = fractal2(q * 0.6, 2, 0.5, footprint * 0.6, d.seed ^ 0x51);
-            fractal2(q + Vec2::new(0.0, 0.7 * bend), octaves, 0.62, footprint, d.seed)
+            fractal2(q + Vec2::new(0.0, 0.7 * bend), octaves, 0.52, footprint, d.seed)
         } else {
-            fractal2(q, octaves, if octaves > 3 { 0.62 } else { 0.5 }, footprint, d.seed)
+            fractal2(q, octaves, if octaves > 3 { 0.52 } else { 0.5 }, footprint, d.seed)
         };
         if d.cells > 0.0 {
             let cells = fractal2(q * 7.0, 2, 0.4, footprint * 7.0, d.seed ^ 0xce11);
@@ -157,10 +121,10 @@ impl Cloud {
         }
         let size = 2.6 / d.scale;
         let q = Vec3::new(p.x * size, p.y * size, level * d.thickness * size * 1.3);
-        let lumps = billows3(q, if fine { 3 } else { 1 }, d.seed ^ 0xb1);
+        let lumps = billows3(q, if fine { 2 } else { 1 }, d.seed ^ 0xb1);
         let rim = (level * 9.0).min(1.0);
         let top = ((rise + most * lumps).max(0.0) / 0.9).powf(2.0 / 3.0).min(1.0);
-        (((inside + most * lumps) * 2.5).clamp(0.0, 1.0) * rim, top)
+        (((inside + most * lumps) * 1.8).clamp(0.0, 1.0) * rim, top)
     }
 
     /// Distance to height `h` along a ray with sine `up` of its elevation, km.
@@ -245,40 +209,6 @@ impl Cloud {
             light += l.ground * 0.5 * (1.0 - level);
         }
         light
-    }
-
-    fn gather_sheet(&self, direction: Vec3, footprint: f32) -> Option<Gathered> {
-        let d = &self.deck;
-        let up = direction.z.max(0.0);
-        let distance = Self::reach(d.base, up);
-        let p = Vec2::new(direction.x, direction.y) * distance;
-        // towards the horizon a sample covers more ground along the ray than across
-        let tilt = (up * up + 2.0 * d.base / EARTH).sqrt().min(1.0);
-        let width = footprint * distance * (0.5 + 0.5 / tilt);
-        let v = self.field(p, width);
-        let edge = ((v - self.threshold) / (0.25 + 0.7 * d.ragged)).clamp(0.0, 1.0);
-        let depth = d.depth * edge * edge * (3.0 - 2.0 * edge) * (1.4 * d.ragged * v).exp();
-        if depth < 1e-3 {
-            return None;
-        }
-        let slant = depth / tilt;
-        let transmittance = (-slant).exp();
-        let seen = 1.0 - transmittance;
-        let mut radiance = Vec3::ZERO;
-        for l in &self.lighting {
-            let sun = l.source.z.max(0.0);
-            let tilt_sun = (sun * sun + 2.0 * d.base / EARTH).sqrt().min(1.0);
-            let cosine = direction.dot(l.source);
-            let once = (0.75 * henyey_greenstein(0.82, cosine) + 0.25 * henyey_greenstein(0.1, cosine))
-                * (-0.18 * depth / tilt_sun).exp();
-            let flux = (l.direct * tilt_sun.max(sun) + PI * l.sky) / PI;
-            let often = flux / (1.0 + DIFFUSION * depth / tilt_sun.max(0.3)) * 3.0 / 7.0 * (1.0 + 2.0 * up);
-            // a thin sheet scatters once, a thick one often
-            let thick = 1.0 - (-0.5 * depth).exp();
-            radiance += seen
-                * (l.direct * once + often * thick + l.sky * 0.5 * (1.0 - thick) + l.ground * 0.3 * thick);
-        }
-        Some(Gathered { radiance, transmittance, distance })
     }
 }
 

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::random::{Draw, Stream};
 use super::scene::{Moon, Place, Scene, SkyKind};
+use super::view::sun_in_view;
 use clouds::clouds;
 use land::{ground, ridges};
 
@@ -74,26 +75,26 @@ impl Scene {
         ]);
         let sky = fixed.sky.unwrap_or(sky);
         let place = draw.weighted(&[
-            (0.17, Place::PureSky),
-            (0.15, Place::Plain),
-            (0.10, Place::Hills),
-            (0.05, Place::Coast),
-            (0.06, Place::Lake),
+            (0.21, Place::PureSky),
+            (0.12, Place::Plain),
+            (0.08, Place::Hills),
+            (0.04, Place::Coast),
+            (0.04, Place::Lake),
             (0.10, Place::Park),
-            (0.09, Place::Forest),
-            (0.08, Place::Village),
-            (0.09, Place::Street),
-            (0.07, Place::Square),
-            (0.03, Place::Courtyard),
-            (0.04, Place::Rocks),
-            (0.04, Place::Shelter),
+            (0.07, Place::Forest),
+            (0.06, Place::Village),
+            (0.08, Place::Street),
+            (0.12, Place::Square),
+            (0.02, Place::Courtyard),
+            (0.03, Place::Rocks),
+            (0.03, Place::Shelter),
         ]);
         let place = fixed.place.unwrap_or(place);
         let elevation = elevation(draw, sky);
         let sun_elevation = fixed.sun_elevation.unwrap_or(elevation);
         let azimuth = draw.azimuth().to_degrees();
-        let haze = draw.normal(0.0, 0.35).exp();
-        let turbidity = (if sky == SkyKind::Overcast { 3.4 } else { 2.25 } * haze).clamp(1.7, 9.0);
+        let haze = draw.normal(0.0, 0.4).exp();
+        let turbidity = (if sky == SkyKind::Overcast { 4.0 } else { 2.45 } * haze).clamp(1.7, 9.0);
         let clouds = clouds(draw, sky, fixed.cloud_cover);
         let moon = moon(draw, sun_elevation);
         let settled =
@@ -107,10 +108,10 @@ impl Scene {
         }
         let ridges = ridges(draw, place, &ground);
         // what the camera leaves of a coloured cast: it takes the light of noon as white, more or less
-        let cast = draw.normal(-0.22, 0.16);
+        let cast = draw.normal(-0.28, 0.17);
         let tint = draw.normal(0.0, 0.03);
         let white = [(0.4 * cast).exp(), tint.exp(), (-0.8 * cast).exp()];
-        Self {
+        let mut scene = Self {
             seed,
             index,
             sky,
@@ -128,9 +129,29 @@ impl Scene {
             ridges,
             lit: sun_elevation < 0.5 && (settled || draw.chance(0.3)),
             white,
+        };
+        if fixed.sun_azimuth.is_none() && sun_elevation > -0.3 {
+            scene.seek_sun();
+        }
+        scene
+    }
+
+    /// Turns the sun to where the viewer sees it, if there is such a place. Photographers who measure light wait for the
+    /// sun and step out of the shade: more suns are in view than chance would have.
+    fn seek_sun(&mut self) {
+        let mut draw = Draw::new(self.seed, self.index, Stream::Sun);
+        if draw.chance(SUN_SOUGHT) {
+            let azimuths: [f32; 12] = std::array::from_fn(|_| draw.azimuth().to_degrees());
+            let first = std::iter::once(self.sun_azimuth);
+            if let Some(azimuth) = sun_in_view(self, first.chain(azimuths)) {
+                self.sun_azimuth = azimuth;
+            }
         }
     }
 }
+
+/// Share of scenes by day whose viewer stands in the sun if he can.
+const SUN_SOUGHT: f32 = 0.6;
 
 fn elevation(draw: &mut Draw, sky: SkyKind) -> f32 {
     // one draw in every case, so that what follows stays the same when the sky is fixed

@@ -2,8 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use super::noise::fractal2;
-use super::scene::{Ground, Pattern, Surface};
+use super::noise::{cell, fractal2};
+use super::surface::{Ground, Pattern, Surface};
 
 /// The ground at a point.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +54,16 @@ impl Ground {
             Pattern::Strip => {
                 let share = if self.surface == Surface::Paving { 1.0 } else { 0.7 };
                 let bend = 0.35 * fractal2(p / 14.0, 3, 0.5, footprint / 14.0, seed) * self.width.min(3.0);
-                share * soft(self.width - axis.perp_dot(p).abs() + bend, 0.3)
+                let across = axis.perp_dot(p) - self.offset;
+                share * soft(self.width - across.abs() + bend, 0.3)
+            }
+            Pattern::Rows => {
+                let bend = fractal2(p / 20.0, 2, 0.5, footprint / 20.0, seed) * self.width;
+                let period = 2.0 * self.width;
+                let across = (axis.perp_dot(p) - self.offset + bend) / period;
+                // a wave through a box as wide as the footprint
+                let seen = (1.0 - footprint / period).max(0.0);
+                0.4 + 0.4 * seen * (std::f32::consts::TAU * across).sin()
             }
             Pattern::Shore => {
                 let bend =
@@ -66,19 +75,36 @@ impl Ground {
 
     fn patch(&self, surface: Surface, p: Vec2, footprint: f32, which: u32) -> Patch {
         let (size, contrast) = surface.texture();
+        let contrast = contrast * self.contrast;
         let seed = self.seed ^ (which.wrapping_mul(0x9e37));
         if surface == Surface::Water {
             return Patch { albedo: surface.albedo(), normal: self.waves(p, footprint), water: 1.0 };
         }
         let v = fractal2(p / size, 6, 0.85, footprint / size, seed);
         let broad = fractal2(p / (9.0 * size), 3, 0.6, footprint / (9.0 * size), seed ^ 0xb4);
+        let vast = fractal2(p / (50.0 * size), 3, 0.6, footprint / (50.0 * size), seed ^ 0xb5);
+        let tiles = if surface == Surface::Paving { 0.5 * self.tiles(p, footprint) } else { 0.0 };
         let slope = |k: u32| contrast * 0.6 * fractal2(p / size, 4, 0.7, footprint / size, seed ^ k);
         let tint = Vec3::new(1.0 + 0.25 * contrast * broad, 1.0, 1.0 - 0.25 * contrast * broad);
         Patch {
-            albedo: surface.albedo() * tint * (contrast * (v + 0.8 * broad)).exp(),
+            albedo: surface.albedo() * tint * (contrast * (0.8 * v + 1.2 * broad + 1.2 * vast + tiles)).exp(),
             normal: Vec3::new(slope(1), slope(2), 1.0).normalize(),
             water: 0.0,
         }
+    }
+
+    /// How tiles and joints deviate from the mean, where a sample resolves them.
+    fn tiles(&self, p: Vec2, footprint: f32) -> f32 {
+        let size = 0.4 + 0.5 * (self.seed % 7) as f32;
+        let seen = 1.0 - footprint / size;
+        if seen <= 0.0 {
+            return 0.0;
+        }
+        let axis = Vec2::from_angle(self.bearing.to_radians());
+        let q = Vec2::new(p.dot(axis), axis.perp_dot(p)) / size;
+        let cut = q.floor();
+        let joint = (q - cut - 0.5).abs().max_element() > 0.5 - 0.04 / size;
+        seen * (1.4 * (cell(cut.x as i32, cut.y as i32, self.seed) - 0.5) - if joint { 1.0 } else { 0.0 })
     }
 
     /// Normal of the waves that a sample resolves.
@@ -95,23 +121,67 @@ impl Ground {
         (0.5 * (0.003 + 0.005_12 * self.wind)).sqrt()
     }
 
-    /// Radiance of the glitter of a source of irradiance 1: the microfacet form of Cox & Munk, shadowing left out.
-    /// Directions point away from the water.
-    pub(super) fn glitter(&self, to_eye: Vec3, to_source: Vec3) -> f32 {
-        let half = (to_eye + to_source).normalize_or(Vec3::Z);
-        if half.z <= 0.05 || to_eye.z <= 1e-3 {
-            return 0.0;
-        }
-        let variance = self.slope_deviation().powi(2);
-        let slope2 = (1.0 - half.z * half.z) / (half.z * half.z);
-        let density = (-0.5 * slope2 / variance).exp() / (2.0 * std::f32::consts::PI * variance);
-        // the rougher the sea and the lower the eye, the more of it waves hide
-        density * fresnel(half.dot(to_eye))
-            / (4.0 * (to_eye.z + 2.0 * variance.sqrt() * 0.3) * half.z.powi(4))
+    /// How much of the light from a source rough ground sends back, relative to a flat Lambert surface: its grains and
+    /// blades show their shaded sides against the light, and hide their shadows in it. Directions point away.
+    pub(super) fn facing(&self, to_eye: Vec3, to_source: Vec3) -> f32 {
+        let low = (1.0 - to_source.z * to_source.z).max(0.0).sqrt();
+        1.0 + self.roughness * low * (0.9 * to_eye.dot(to_source) - 0.1)
     }
+
+    /// What is left of the light where one looks down between blades and grains, and at what stands under a camera;
+    /// `down` is the sine of the ray's elevation.
+    pub(super) fn depths(&self, down: f32) -> f32 {
+        1.0 - self.hollow * down * down
+    }
+}
+
+/// Radiance of the glitter of a source of irradiance 1 on facets whose slopes have this variance: the microfacet form of
+/// Cox & Munk, shadowing left out. Directions point away from the surface.
+pub(super) fn glitter(variance: f32, to_eye: Vec3, to_source: Vec3) -> f32 {
+    let half = (to_eye + to_source).normalize_or(Vec3::Z);
+    if half.z <= 0.05 || to_eye.z <= 1e-3 {
+        return 0.0;
+    }
+    let slope2 = (1.0 - half.z * half.z) / (half.z * half.z);
+    let density = (-0.5 * slope2 / variance).exp() / (2.0 * std::f32::consts::PI * variance);
+    // the rougher the sea and the lower the eye, the more of it waves hide
+    density * fresnel(half.dot(to_eye)) / (4.0 * (to_eye.z + 2.0 * variance.sqrt() * 0.3) * half.z.powi(4))
 }
 
 /// Reflectance of water (Schlick 1994).
 pub(super) fn fresnel(cosine: f32) -> f32 {
     0.02 + 0.98 * (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::{Fixed, Place, Scene};
+
+    #[test]
+    fn patterns_vanish_at_a_distance_and_rough_ground_is_darker_against_the_light() {
+        let plain = Scene::draw(1, 2, &Fixed { place: Some(Place::Plain), ..Fixed::default() }).ground;
+        let rows = Ground {
+            surface: Surface::Paving,
+            second: Surface::Grass,
+            pattern: Pattern::Rows,
+            width: 0.8,
+            roughness: 0.5,
+            hollow: 0.4,
+            ..plain
+        };
+        let across = Vec2::from_angle(rows.bearing.to_radians()).perp();
+        let deviation = |footprint: f32| {
+            let values: Vec<f32> =
+                (0..64).map(|k| rows.at(0.13 * k as f32 * across, footprint).albedo.y.ln()).collect();
+            let mean = values.iter().sum::<f32>() / 64.0;
+            (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / 64.0).sqrt()
+        };
+        let [near, far] = [0.05, 400.0].map(deviation);
+        assert!(near > 0.25 && far < 1e-3, "{near} {far}");
+        let low = Vec3::new(0.9, 0.0, 0.436);
+        let [with, against] = [1.0, -1.0].map(|x| rows.facing(Vec3::new(0.9 * x, 0.0, 0.436), low));
+        assert!(with > 1.2 && against < 0.85 && against > 0.0, "{with} {against}");
+        assert!((rows.depths(-1.0) - 0.6).abs() < 1e-6 && rows.depths(0.0) == 1.0);
+    }
 }

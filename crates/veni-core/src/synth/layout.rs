@@ -9,7 +9,8 @@ use glam::{Vec2, Vec3};
 
 use super::random::{Draw, Stream};
 use super::scene::{Place, Scene};
-use super::solid::{Shape, Skin, Solid};
+use super::skin::Skin;
+use super::solid::{Shape, Solid};
 
 /// Leaves overhead, as a layer with holes.
 #[derive(Clone, Copy, Debug)]
@@ -50,7 +51,7 @@ pub(super) fn layout(scene: &Scene) -> Layout {
     let mut builder = Builder {
         draw: Draw::new(scene.seed, scene.index, Stream::Layout),
         lit: scene.lit,
-        snow: scene.ground.surface == super::scene::Surface::Snow,
+        snow: scene.ground.surface == super::surface::Surface::Snow,
         bearing: Vec2::from_angle(scene.ground.bearing.to_radians()),
         layout: Layout::default(),
     };
@@ -115,8 +116,8 @@ impl Builder {
             }
             Place::Street => self.street(fullness),
             Place::Square => {
-                let radius = self.draw.log_range(16.0, 50.0);
-                self.ring(radius, [6.0, 26.0], 0.92);
+                let radius = self.draw.log_range(14.0, 45.0);
+                self.ring(radius, [7.0, 26.0], 0.92);
                 self.trees(many(0.0, 8.0), 6.0, 0.7 * radius);
                 self.vehicles(many(0.0, 8.0), 5.0, 0.7 * radius);
                 self.lamp_posts(many(3.0, 9.0), 5.0, 0.8 * radius);

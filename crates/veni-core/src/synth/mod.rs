@@ -26,6 +26,7 @@
 mod ambient;
 mod atmosphere;
 mod cloud;
+mod deck;
 mod disc;
 mod dome;
 mod draw;
@@ -36,17 +37,21 @@ mod noise;
 mod random;
 mod render;
 mod scene;
+mod skin;
 mod sky;
 mod solid;
 mod spectrum;
 mod stage;
+mod surface;
 mod terrain;
+mod view;
 
 #[cfg(test)]
 mod tests;
 
-pub use cloud::{Deck, DeckKind};
+pub use deck::{Deck, DeckKind};
 pub use draw::Fixed;
 pub use generate::generate;
 pub use render::render;
-pub use scene::{Ground, Moon, Pattern, Place, Ridge, RidgeKind, Scene, SkyKind, Surface};
+pub use scene::{Moon, Place, Ridge, RidgeKind, Scene, SkyKind};
+pub use surface::{Ground, Pattern, Surface};

@@ -12,6 +12,8 @@ pub(super) enum Stream {
     Layout,
     /// Stars.
     Stars,
+    /// Where the sun is looked for.
+    Sun,
 }
 
 /// A stream of random numbers with the draws that scenes need.

@@ -1,18 +1,20 @@
 //! A scene built up: what a ray from the eye sees.
 
+mod below;
+
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
 use super::ambient::Ambient;
-use super::ground::fresnel;
-use super::layout::{Canopy, Lamp, layout};
+use super::layout::{Lamp, layout};
 use super::noise::fractal2;
-use super::scene::{Place, Scene};
+use super::scene::Scene;
+use super::skin::Skin;
 use super::sky::{Sky, spiral};
-use super::solid::{Hit, Skin, Solids};
+use super::solid::Hit;
 use super::spectrum::luminance;
-use super::terrain::{Ridges, Slope};
+use super::view::{Thing, View};
 
 /// Radiance of a lit window, kcd/m².
 const WINDOW: Vec3 = Vec3::new(0.034, 0.023, 0.012);
@@ -21,8 +23,6 @@ const OPEN_HEIGHT: f32 = 14.0;
 
 /// Irradiance of street lamps on the houses of a skyline, klx.
 const TOWN: Vec3 = Vec3::new(0.009, 0.0055, 0.0022);
-/// How much denser a canopy gets with every metre, as rays pass through more of it.
-const CANOPY_CLOSES: f32 = 0.025;
 /// Lamps further away than this light nothing, metres.
 const LAMP_REACH: f32 = 60.0;
 
@@ -30,10 +30,8 @@ const LAMP_REACH: f32 = 60.0;
 pub(super) struct Stage<'a> {
     pub(super) scene: &'a Scene,
     pub(super) sky: Sky,
-    solids: Solids,
-    canopy: Option<Canopy>,
+    view: View,
     pub(super) lamps: Vec<Lamp>,
-    ridges: Ridges,
     /// Sources that no ridge hides: irradiance and direction.
     sources: Vec<(Vec3, Vec3)>,
     street_light: Vec3,
@@ -41,39 +39,19 @@ pub(super) struct Stage<'a> {
     near: Ambient,
 }
 
-/// What is on the way of a ray.
-enum Thing {
-    Solid(Hit),
-    Leaves(f32),
-    Ground(f32),
-    Slope(Slope),
-    Sky,
-}
-
 impl<'a> Stage<'a> {
     pub(super) fn new(scene: &'a Scene) -> Self {
         let sky = Sky::new(scene);
-        let layout = layout(scene);
+        let mut layout = layout(scene);
         let directions: Vec<_> = sky.sources.iter().map(|s| s.direction).collect();
-        let solids = Solids::new(layout.solids, &directions);
-        let ridges = Ridges::new(scene.ridges.clone());
-        let hidden = |d: Vec3| ridges.first(scene.eye, d, f32::INFINITY, 0.0).is_some();
+        let view = View::new(scene, &mut layout, &directions);
+        let hidden = |d: Vec3| view.ridges.first(scene.eye, d, f32::INFINITY, 0.0).is_some();
         let visible = |d: Vec3, e: Vec3| if d.z <= 0.0 || hidden(d) { Vec3::ZERO } else { e };
         let sources = sky.sources.iter().map(|s| (visible(s.direction, s.direct()), s.direction)).collect();
         let nothing = Ambient::new(&[]);
-        let (canopy, lamps, street_light) = (layout.canopy, layout.lamps, layout.street_light);
-        let mut this = Self {
-            scene,
-            sky,
-            solids,
-            canopy,
-            lamps,
-            ridges,
-            sources,
-            street_light,
-            open: nothing.clone(),
-            near: nothing,
-        };
+        let (lamps, street_light) = (layout.lamps, layout.street_light);
+        let mut this =
+            Self { scene, sky, view, lamps, sources, street_light, open: nothing.clone(), near: nothing };
         this.light_up();
         this
     }
@@ -83,7 +61,7 @@ impl<'a> Stage<'a> {
         let (mut open, mut near, mut seen) = (Vec::new(), Vec::new(), 0.0);
         let eye = Vec3::Z * self.scene.eye;
         let above: Vec<_> =
-            spiral(160).map(|d| (d, self.sky.radiance(d, 0.15, 0.5), self.thing(eye, d, 0.1))).collect();
+            spiral(160).map(|d| (d, self.sky.radiance(d, 0.15, 0.5), self.view.thing(eye, d, 0.1))).collect();
         let sky: Vec3 = above.iter().map(|(d, l, _)| *l * d.z).sum::<Vec3>() * (2.0 * PI / 160.0);
         let direct: Vec3 = self.sources.iter().map(|(e, d)| *e * d.z.max(0.0)).sum();
         let albedo = Vec3::from(self.scene.ground.albedo());
@@ -100,7 +78,7 @@ impl<'a> Stage<'a> {
                     Thing::Leaves(_) => wall(0.12) + 0.05 * *radiance,
                     Thing::Slope(_) => *radiance * 0.3,
                     Thing::Solid(h) => {
-                        wall(if matches!(self.solids.all[h.solid].skin, Skin::Leaves { .. }) {
+                        wall(if matches!(self.view.solids.all[h.solid].skin, Skin::Leaves { .. }) {
                             0.1
                         } else {
                             0.28
@@ -129,16 +107,11 @@ impl<'a> Stage<'a> {
 
     /// Whether nothing but air and cloud lies in a direction, up to `reach` metres.
     pub(super) fn is_clear(&self, direction: Vec3, reach: f32) -> bool {
-        match self.thing(Vec3::Z * self.scene.eye, direction, 0.0) {
-            Thing::Sky => true,
-            Thing::Solid(h) => h.distance > reach,
-            Thing::Leaves(t) | Thing::Ground(t) => t > reach,
-            Thing::Slope(s) => s.distance > reach,
-        }
+        self.view.is_clear(direction, reach)
     }
 
     fn look(&self, eye: Vec3, direction: Vec3, footprint: f32, jitter: f32, mirrors: bool) -> Vec3 {
-        match self.thing(eye, direction, footprint) {
+        match self.view.thing(eye, direction, footprint) {
             Thing::Sky => self.sky.radiance(direction, footprint, jitter),
             Thing::Solid(hit) => self.solid(eye, direction, hit, footprint, mirrors),
             Thing::Leaves(t) => self.leaves(eye + t * direction, direction),
@@ -156,43 +129,26 @@ impl<'a> Stage<'a> {
         }
     }
 
-    fn thing(&self, eye: Vec3, direction: Vec3, footprint: f32) -> Thing {
-        let down = if direction.z < -1e-5 { -eye.z / direction.z } else { f32::INFINITY };
-        let run = Vec2::new(direction.x, direction.y).length();
-        let hit = self.solids.first(eye, direction, down.min(2000.0));
-        let solid = hit.map_or(f32::INFINITY, |h| h.distance);
-        if let Some(t) = self.canopy.and_then(|c| canopy_hit(&c, eye, direction))
-            && t < solid
-        {
-            return Thing::Leaves(t);
-        }
-        if let Some(hit) = hit {
-            return Thing::Solid(hit);
-        }
-        match self.ridges.first(eye.z, direction, down * run, footprint) {
-            Some(slope) => Thing::Slope(slope),
-            None if down.is_finite() => Thing::Ground(down),
-            None => Thing::Sky,
-        }
-    }
-
     /// Whether source `k` reaches a point.
     fn lit(&self, point: Vec3, k: usize) -> bool {
         let (light, towards) = self.sources[k];
-        light.max_element() > 0.0
-            && self.canopy.is_none_or(|c| canopy_hit(&c, point, towards).is_none())
-            && self.solids.lit(point, k, towards)
+        light.max_element() > 0.0 && self.view.reaches(point, k, towards)
     }
 
-    /// Irradiance on a surface near the viewer, and what falls on its back from the sources.
-    fn irradiance(&self, point: Vec3, normal: Vec3) -> (Vec3, Vec3) {
+    /// Irradiance on a surface near the viewer, and what falls on its back from the sources. `weigh` multiplies the
+    /// light from the direction of a source.
+    fn irradiance(&self, point: Vec3, normal: Vec3, weigh: impl Fn(Vec3) -> f32) -> (Vec3, Vec3) {
         let (mut front, mut back) = (Vec3::ZERO, Vec3::ZERO);
         let start = point + normal * 0.02;
         for (k, (light, towards)) in self.sources.iter().enumerate() {
             let cosine = normal.dot(*towards);
             let from = if cosine > 0.0 { start } else { point - normal * 0.02 };
             if self.lit(from, k) {
-                if cosine > 0.0 { front += *light * cosine } else { back -= *light * cosine }
+                if cosine > 0.0 {
+                    front += *light * cosine * weigh(*towards)
+                } else {
+                    back -= *light * cosine
+                }
             }
         }
         for lamp in &self.lamps {
@@ -217,14 +173,15 @@ impl<'a> Stage<'a> {
 
     fn solid(&self, eye: Vec3, direction: Vec3, hit: Hit, footprint: f32, mirrors: bool) -> Vec3 {
         let point = eye + hit.distance * direction;
-        let solid = &self.solids.all[hit.solid];
+        let solid = &self.view.solids.all[hit.solid];
         let normal = if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal };
-        let (albedo, shine, mirror) = solid.paint(point, hit.normal, footprint * hit.distance);
-        let (front, back) = self.irradiance(point, normal);
+        let (albedo, shine, mirror) =
+            solid.skin.paint(point, hit.normal, footprint * hit.distance, solid.seed);
+        let (front, back) = self.irradiance(point, normal, |_| 1.0);
         let mut out = if let Skin::Leaves { .. } = solid.skin {
             // leaves face all ways, let light through, and shade each other more the deeper they sit
             let deep =
-                if hit.normal.dot(direction) > 0.0 { 0.5 } else { 0.65 + 0.3 * hit.normal.z.max(-0.6) };
+                if hit.normal.dot(direction) > 0.0 { 0.5 } else { 0.55 + 0.3 * hit.normal.z.max(-0.6) };
             let through = Vec3::new(0.8, 1.0, 0.35);
             albedo / PI * (front * deep + 0.5 * through * back)
         } else {
@@ -246,106 +203,18 @@ impl<'a> Stage<'a> {
 
     /// The underside of a canopy: leaves against the light.
     fn leaves(&self, point: Vec3, direction: Vec3) -> Vec3 {
-        let canopy = self.canopy.as_ref().map_or(Vec3::ZERO, |c| c.albedo);
+        let canopy = self.view.canopy.as_ref().map_or(Vec3::ZERO, |c| c.albedo);
         let dense = (0.9 * fractal2(Vec2::new(point.x, point.y) * 0.9, 4, 0.7, 0.0, 0x1eaf)).exp();
         let direct: Vec3 = self.sources.iter().map(|(e, d)| *e * d.z.max(0.0)).sum();
         let through = Vec3::new(0.75, 1.0, 0.3);
         let below = self.near.at(-Vec3::Z);
-        let above = (direct + self.open.at(Vec3::Z)) * 0.08 * dense;
+        let above = (direct + self.open.at(Vec3::Z)) * 0.035 * dense;
         let own = canopy / PI * (below + through * above);
         self.sky.through_air(own, direction, point.length() * 1e-3)
-    }
-
-    fn ground(&self, eye: Vec3, direction: Vec3, t: f32, footprint: f32, jitter: f32, mirrors: bool) -> Vec3 {
-        if self.scene.place == Place::PureSky {
-            return self.mirrored_sky(direction, footprint, jitter);
-        }
-        let point = eye + t * direction;
-        // a sample reaches further along the ray than across
-        let grazing = (-direction.z).max(1e-3);
-        let width = footprint * t * (0.4 + 0.6 / grazing.sqrt());
-        let patch = self.scene.ground.at(Vec2::new(point.x, point.y), width);
-        let (front, _) = self.irradiance(point, patch.normal);
-        let mut out = patch.albedo / PI * front;
-        if patch.water > 0.0 && mirrors {
-            let to_eye = -direction;
-            let mut reflected = direction - 2.0 * direction.dot(patch.normal) * patch.normal;
-            // a wave that turns the ray down shows another wave, which shows the sky near the horizon
-            reflected.z = reflected.z.abs().max(0.01);
-            let reflected = reflected.normalize();
-            let origin = point.with_z(0.02);
-            // rough water mirrors the sky of steeper rays: the mean over slopes that face the viewer
-            let cosine =
-                (to_eye.dot(patch.normal).max(0.0) + 0.6 * self.scene.ground.slope_deviation()).min(1.0);
-            let mut mirrored = fresnel(cosine) * self.reflected(origin, reflected, footprint, jitter);
-            for (k, (light, towards)) in self.sources.iter().enumerate() {
-                if self.lit(origin, k) {
-                    mirrored += *light * self.scene.ground.glitter(to_eye, *towards);
-                }
-            }
-            out = out.lerp(mirrored + out, patch.water);
-        }
-        self.sky.through_air(out, direction, t * 1e-3)
-    }
-
-    /// The sky mirrored at the horizon, more blurred and darker further down.
-    fn mirrored_sky(&self, direction: Vec3, footprint: f32, jitter: f32) -> Vec3 {
-        let down = -direction.z;
-        let up = Vec3::new(direction.x, direction.y, down);
-        let (across, along) = up.any_orthonormal_pair();
-        let blur = 0.02 + 0.2 * down;
-        let mut sum = Vec3::ZERO;
-        for k in 0..4 {
-            let (s, c) = (std::f32::consts::TAU * (k as f32 + jitter) / 4.0).sin_cos();
-            let turned = up + blur * (c * across + s * along);
-            sum += self.sky.radiance(turned.with_z(turned.z.abs()).normalize(), footprint + blur, jitter);
-        }
-        0.25 * (1.0 - 0.72 * down) * sum
-    }
-
-    /// What water shows: things near the shore in the plane of the ray, else the sky.
-    fn reflected(&self, origin: Vec3, direction: Vec3, footprint: f32, jitter: f32) -> Vec3 {
-        // seen from the mirror image of the eye the ray starts on the axis, as the lists of solids need it
-        let flat = Vec2::new(direction.x, direction.y).length();
-        let run = Vec2::new(origin.x, origin.y).length();
-        let eye = Vec3::new(0.0, 0.0, origin.z - run / flat.max(1e-4) * direction.z);
-        let from =
-            self.solids.first(eye, direction, 2000.0).filter(|h| (eye + h.distance * direction).z > 0.0);
-        match from {
-            Some(hit) => self.solid(eye, direction, hit, footprint, false),
-            None => match self.ridges.first(self.scene.eye, direction, f32::INFINITY, footprint) {
-                Some(s) => {
-                    let own = s.albedo / PI * self.irradiance_far(s.normal);
-                    self.sky.through_air(own, direction, s.distance * 1e-3)
-                }
-                None => self.sky.radiance(direction, footprint.max(0.03), jitter),
-            },
-        }
     }
 
     /// Brightness by which neighbouring samples are compared.
     pub(super) fn level(radiance: Vec3) -> f32 {
         luminance(radiance).max(1e-12)
     }
-}
-
-/// Where a ray from below meets the leaves of a canopy.
-fn canopy_hit(canopy: &Canopy, origin: Vec3, direction: Vec3) -> Option<f32> {
-    if direction.z <= 0.0 || origin.z >= canopy.height {
-        return None;
-    }
-    // two layers: gaps close towards the horizon, as they do under trees
-    for (k, lift) in [(0u32, 0.0f32), (1, 0.35)] {
-        let t = (canopy.height * (1.0 + lift) - origin.z) / direction.z;
-        let p = origin + t * direction;
-        let p = Vec2::new(p.x, p.y);
-        if p.length() > canopy.radius {
-            continue;
-        }
-        let n = fractal2(p / canopy.scale, 5, 0.72, 0.0, canopy.seed ^ (k * 0x77));
-        if n < canopy.threshold + CANOPY_CLOSES * p.length() {
-            return Some(t);
-        }
-    }
-    None
 }

@@ -3,7 +3,8 @@
 use glam::{Vec2, Vec3};
 
 use super::noise::{cell, fractal2, noise2};
-use super::scene::{Ridge, RidgeKind, Surface};
+use super::scene::{Ridge, RidgeKind};
+use super::surface::Surface;
 
 /// Ridges from near to far.
 #[derive(Clone, Debug)]
@@ -71,7 +72,15 @@ fn profile(ridge: &Ridge, flat: Vec2, footprint: f32) -> f32 {
             1.4 * cell(block, 1, ridge.seed) - 0.7 + 0.6 * quarter + tower
         }
     };
-    ridge.height * (1.0 + ridge.relief * n.clamp(-2.0, 2.0)).max(0.0)
+    // a wood or a town ends somewhere
+    let stands = match ridge.kind {
+        RidgeKind::Trees | RidgeKind::Town if ridge.gaps > 0.0 => {
+            let n = fractal2(flat * 1.1, 4, 0.55, footprint * 1.1, ridge.seed ^ 0x6a95);
+            ((n + 0.9 * (1.0 - 2.0 * ridge.gaps)) * 5.0 + 0.5).clamp(0.0, 1.0)
+        }
+        _ => 1.0,
+    };
+    stands * ridge.height * (1.0 + ridge.relief * n.clamp(-2.0, 2.0)).max(0.0)
 }
 
 /// Which house of a skyline, and where on its front (0 to 1).

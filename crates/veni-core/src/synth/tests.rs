@@ -134,6 +134,24 @@ fn the_sun_is_where_it_was_asked_for_with_its_energy_at_any_size() {
 }
 
 #[test]
+fn a_hidden_sun_is_moved_to_where_it_is_in_view() {
+    let clear = Fixed { place: Some(Place::Square), sky: Some(SkyKind::Clear), ..Fixed::default() };
+    let in_view = |s: &Scene| stage::Stage::new(s).is_clear(s.sun_direction(), f32::INFINITY);
+    let mut moved = 0;
+    for index in 0..40 {
+        let up = Scene::draw(4, index, &Fixed { sun_elevation: Some(18.0), ..clear });
+        // below the horizon nobody looks for it, and the azimuth drawn is the same
+        let down = Scene::draw(4, index, &Fixed { sun_elevation: Some(-1.0), ..clear });
+        let first = Scene { sun_azimuth: down.sun_azimuth, ..up.clone() };
+        if first != up {
+            moved += 1;
+            assert!(in_view(&up) && !in_view(&first), "scene {index}");
+        }
+    }
+    assert!((4..30).contains(&moved), "{moved} of 40");
+}
+
+#[test]
 fn illuminance_follows_hour_and_weather() {
     let grid = Equirect::new(96, 48);
     let up = |scene: &Scene| illuminance(&render(scene, grid), [0.0, 0.0, 1.0]);

@@ -1,6 +1,6 @@
 //! Which clouds a sky has.
 
-use crate::synth::cloud::{Deck, DeckKind};
+use crate::synth::deck::{Deck, DeckKind};
 use crate::synth::random::Draw;
 use crate::synth::scene::SkyKind;
 
@@ -10,7 +10,7 @@ pub(super) fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<D
     let closed = sky == SkyKind::Overcast;
     let [low, sheet, high] = match sky {
         SkyKind::Clear => [0.08, 0.03, 0.3],
-        SkyKind::Cloudy => [0.65, 0.35, 0.45],
+        SkyKind::Cloudy => [0.5, 0.4, 0.5],
         SkyKind::Overcast => [0.5, 1.0, 0.0],
         SkyKind::Sunset => [0.3, 0.3, 0.5],
         SkyKind::Night => [0.25, 0.2, 0.3],
@@ -21,12 +21,12 @@ pub(super) fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<D
         kind: DeckKind::Heap,
         base: draw.log_range(0.7, 2.2),
         thickness: draw.log_range(0.25, 1.6),
-        cover: draw.range(0.06, 0.62),
+        cover: draw.range(0.06, 0.55),
         depth: draw.log_range(8.0, 50.0),
-        scale: draw.log_range(0.7, 4.0),
+        scale: draw.log_range(1.2, 6.0),
         stretch: draw.range(1.0, 1.4),
         wind,
-        ragged: draw.range(0.25, 1.0),
+        ragged: draw.range(0.1, 0.7),
         cells: 0.0,
         seed: draw.bits(),
     };
@@ -36,11 +36,11 @@ pub(super) fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<D
         thickness: 0.5,
         cover: if closed { 1.0 } else { draw.range(0.15, 0.8) },
         depth: if closed { draw.log_range(5.0, 40.0) } else { draw.log_range(1.0, 9.0) },
-        scale: draw.log_range(1.5, 7.0),
+        scale: draw.log_range(2.5, 12.0),
         stretch: draw.log_range(1.0, 2.2),
         wind: wind + draw.normal(0.0, 0.6),
-        ragged: draw.range(0.2, 0.9),
-        cells: if draw.chance(0.5) { draw.range(0.2, 1.0) } else { 0.0 },
+        ragged: draw.range(0.1, 0.6),
+        cells: if draw.chance(0.3) { draw.range(0.1, 0.7) } else { 0.0 },
         seed: draw.bits(),
     };
     let cirrus = Deck {
@@ -49,10 +49,10 @@ pub(super) fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<D
         thickness: 0.5,
         cover: draw.range(0.2, 0.8),
         depth: draw.log_range(0.12, 1.3),
-        scale: draw.log_range(2.5, 9.0),
+        scale: draw.log_range(4.0, 16.0),
         stretch: draw.log_range(1.6, 5.0),
         wind: wind + draw.normal(0.0, 0.8),
-        ragged: draw.range(0.4, 1.0),
+        ragged: draw.range(0.2, 0.8),
         cells: if draw.chance(0.25) { draw.range(0.1, 0.6) } else { 0.0 },
         seed: draw.bits(),
     };

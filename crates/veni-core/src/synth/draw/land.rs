@@ -1,7 +1,8 @@
 //! What the ground is, and what stands at the horizon.
 
 use crate::synth::random::Draw;
-use crate::synth::scene::{Ground, Pattern, Place, Ridge, RidgeKind, Surface};
+use crate::synth::scene::{Place, Ridge, RidgeKind};
+use crate::synth::surface::{Ground, Pattern, Surface};
 
 /// Surfaces by weight.
 type Choices<'a> = &'a [(f32, Surface)];
@@ -42,13 +43,16 @@ pub(super) fn ground(draw: &mut Draw, place: Place) -> Ground {
         Place::Coast | Place::Lake => &[(1.0, Pattern::Shore)],
         Place::Street => &[(1.0, Pattern::Strip)],
         Place::Park | Place::Village => {
-            &[(1.0, Pattern::Patches), (1.2, Pattern::Strip), (1.0, Pattern::None)]
+            &[(1.5, Pattern::Patches), (1.0, Pattern::Strip), (0.4, Pattern::Rows), (0.6, Pattern::None)]
         }
-        Place::Square | Place::Courtyard => &[(1.0, Pattern::Patches), (2.0, Pattern::None)],
-        _ => &[(2.0, Pattern::Patches), (0.7, Pattern::Strip), (1.5, Pattern::None)],
+        Place::Square | Place::Courtyard => {
+            &[(1.5, Pattern::Patches), (0.6, Pattern::Strip), (0.4, Pattern::Rows), (1.5, Pattern::None)]
+        }
+        _ => &[(2.5, Pattern::Patches), (0.7, Pattern::Strip), (0.7, Pattern::Rows), (0.8, Pattern::None)],
     };
     let pattern = draw.weighted(patterns);
-    let strip = draw.log_range(0.6, 5.0);
+    let strip = draw.log_range(0.4, 4.0);
+    let aside = draw.normal(0.0, 1.0);
     let shore = draw.range(-4.0, 16.0);
     Ground {
         surface,
@@ -56,7 +60,12 @@ pub(super) fn ground(draw: &mut Draw, place: Place) -> Ground {
         pattern,
         bearing: draw.azimuth().to_degrees(),
         width: if pattern == Pattern::Shore { shore } else { strip },
-        tone: draw.normal(-0.2, 0.27).exp().min(if surface == Snow { 1.1 } else { 2.0 }),
+        offset: if place == Place::Street { 0.3 * aside } else { 2.0 * aside },
+        tone: draw.normal(-0.52, 0.32).exp().min(if surface == Snow { 1.1 } else { 2.0 }),
+        contrast: draw.normal(0.38, 0.4).exp().min(3.0),
+        roughness: draw.range(0.0, 0.9),
+        hollow: draw.range(0.1, 0.7),
+        sheen: if draw.chance(0.5) { draw.range(0.0, 0.6) } else { 0.0 },
         wind: draw.log_range(0.4, 9.0),
         seed: draw.bits(),
     }
@@ -91,6 +100,7 @@ pub(super) fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridg
             height: distance * slope,
             relief: draw.range(0.3, 0.9),
             surface: cover,
+            gaps: 0.0,
             snow_line: if snowy { 0.0 } else { 1e5 },
             seed: draw.bits(),
         };
@@ -105,13 +115,15 @@ pub(super) fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridg
         height: distance * draw.log_range(0.05, 0.28),
         relief: draw.range(0.35, 0.8),
         surface: cover,
+        gaps: 0.0,
         snow_line: if snowy { 0.0 } else { distance * draw.range(0.05, 0.5) },
         seed: draw.bits(),
     };
     if draw.chance(mountains) {
         out.push(range);
     }
-    let [near, far] = if place == Place::Forest { [32.0, 60.0] } else { [45.0, 320.0] };
+    let [near, far] = if place == Place::Forest { [32.0, 60.0] } else { [55.0, 500.0] };
+    let open = if place == Place::Forest { 0.0 } else { draw.unit() };
     let distance = draw.log_range(near, far);
     let wood = Ridge {
         kind: RidgeKind::Trees,
@@ -119,6 +131,7 @@ pub(super) fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridg
         height: draw.range(6.0, 17.0) + if place == Place::Forest { 6.0 } else { 0.0 },
         relief: draw.range(0.35, 0.95) * if place == Place::Forest { 0.4 } else { 1.0 },
         surface: Surface::Grass,
+        gaps: open,
         snow_line: 1e5,
         seed: draw.bits(),
     };
@@ -126,12 +139,14 @@ pub(super) fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridg
         out.push(wood);
     }
     let distance = draw.log_range(60.0, 500.0);
+    let open = draw.range(-0.3, 0.7).max(0.0);
     let skyline = Ridge {
         kind: RidgeKind::Town,
         distance,
         height: draw.log_range(8.0, 32.0),
         relief: draw.range(0.3, 0.7),
         surface: Surface::Paving,
+        gaps: open,
         snow_line: 1e5,
         seed: draw.bits(),
     };

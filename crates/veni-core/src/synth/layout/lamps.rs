@@ -4,7 +4,8 @@ use glam::{Vec2, Vec3};
 
 use super::{Builder, Lamp};
 use crate::synth::scene::Place;
-use crate::synth::solid::{Shape, Skin};
+use crate::synth::skin::Skin;
+use crate::synth::solid::Shape;
 
 impl Builder {
     pub(super) fn lamp_posts(&mut self, count: usize, near: f32, far: f32) {

@@ -3,7 +3,11 @@
 use glam::{Vec2, Vec3};
 
 use super::{Builder, Canopy};
-use crate::synth::solid::{Shape, Skin};
+use crate::synth::skin::Skin;
+use crate::synth::solid::Shape;
+
+/// Trees of one grove.
+const GROVE: usize = 6;
 
 impl Builder {
     pub(super) fn leaves(&mut self) -> Vec3 {
@@ -21,8 +25,15 @@ impl Builder {
     }
 
     pub(super) fn trees(&mut self, count: usize, near: f32, far: f32) {
-        for _ in 0..count {
-            let at = self.spot(near, far.max(near + 1.0));
+        // some stand by themselves, some in groves whose crowns touch
+        let (mut grove, mut spread) = (Vec2::ZERO, 0.0);
+        for k in 0..count {
+            let alone = self.spot(near, far.max(near + 1.0));
+            if k % GROVE == 0 {
+                (grove, spread) = (alone, self.draw.range(2.0, 9.0));
+            }
+            let off = Vec2::new(self.draw.normal(0.0, spread), self.draw.normal(0.0, spread));
+            let at = if (grove + off).length() > near && (k / GROVE) % 2 == 0 { grove + off } else { alone };
             let height = self.draw.log_range(4.0, 18.0);
             if self.draw.chance(0.25) { self.conifer(at, height) } else { self.broadleaf(at, height) }
         }
@@ -32,17 +43,17 @@ impl Builder {
         let albedo = self.leaves();
         let bark = self.bark();
         let radius = height * self.draw.range(0.012, 0.03) + 0.05;
-        let clear = height * self.draw.range(0.15, 0.4);
+        let clear = height * self.draw.range(0.05, 0.35);
         self.add(
             Shape::Trunk { centre: at, radius, low: 0.0, high: 0.7 * height },
             Skin::Plain { albedo: bark, mottle: 0.5, size: 0.4 },
         );
         let spread = height * self.draw.range(0.18, 0.4);
-        let open = self.draw.range(0.0, 0.45);
-        let clumps = self.draw.count(4, 9);
+        let open = self.draw.range(0.0, 0.35);
+        let clumps = self.draw.count(5, 10);
         for _ in 0..clumps {
             let off = Vec2::from_angle(self.draw.azimuth()) * spread * self.draw.range(0.1, 0.85);
-            let size = spread * self.draw.range(0.35, 0.65);
+            let size = spread * self.draw.range(0.4, 0.75);
             let z = clear + (height - clear) * self.draw.range(0.15, 0.85);
             let tall = size * self.draw.range(0.6, 1.1);
             self.add(

@@ -3,7 +3,8 @@
 use glam::{Vec2, Vec3};
 
 use super::Builder;
-use crate::synth::solid::{Shape, Skin};
+use crate::synth::skin::Skin;
+use crate::synth::solid::Shape;
 
 impl Builder {
     pub(super) fn boulders(&mut self, count: usize, near: f32, far: f32, largest: f32) {

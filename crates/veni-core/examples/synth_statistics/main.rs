@@ -8,69 +8,13 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use veni_core::panorama::Panorama;
 use veni_core::panorama::tonemap::{Tonemap, quantile};
-use veni_core::panorama::{Panorama, luminance};
-use veni_core::sphere::Equirect;
 use veni_core::synth::{Fixed, generate};
 
-const GRID: Equirect = Equirect { width: 128, height: 64 };
+mod statistics;
 
-/// The statistics of one panorama, by name.
-fn statistics(panorama: &Panorama) -> Vec<(&'static str, f32)> {
-    let exposure = panorama.mean_log_luminance();
-    let log: Vec<f32> = panorama.pixels().iter().map(|p| luminance(*p).max(1e-30).ln() - exposure).collect();
-    let weight = |k: usize| GRID.solid_angle(k / GRID.width);
-    let mean = |rows: std::ops::Range<usize>, f: &dyn Fn(usize) -> f32| {
-        let all = rows.start * GRID.width..rows.end * GRID.width;
-        let total: f64 = all.clone().map(weight).sum();
-        (all.map(|k| f64::from(f(k)) * weight(k)).sum::<f64>() / total) as f32
-    };
-    let ratio = |k: usize, a: usize, b: usize| {
-        let p = panorama.pixels()[k];
-        (p[a].max(1e-30) / p[b].max(1e-30)).ln()
-    };
-    // quantiles by solid angle: each row repeats in proportion
-    let mut spread = Vec::new();
-    for (k, v) in log.iter().enumerate() {
-        let copies = (weight(k) / GRID.solid_angle(32) * 8.0).round().max(1.0) as usize;
-        spread.extend(std::iter::repeat_n(*v, copies));
-    }
-    let q = |at: f64| quantile(&spread, at);
-    let sd = |rows: std::ops::Range<usize>, f: &dyn Fn(usize) -> f32| {
-        let m = mean(rows.clone(), f);
-        mean(rows, &|k| (f(k) - m) * (f(k) - m)).sqrt()
-    };
-    let row_sd = (20..44).map(|j| sd(j..j + 1, &|k| log[k])).sum::<f32>() / 24.0;
-    let step = |k: usize| (log[k] - log[k - k % 128 + (k + 1) % 128]).abs();
-    let chroma = |k: usize| ratio(k, 2, 0);
-    vec![
-        ("sd of ln Y", sd(0..64, &|k| log[k])),
-        ("ln Y, 1 %", q(0.01)),
-        ("5 %", q(0.05)),
-        ("25 %", q(0.25)),
-        ("50 %", q(0.5)),
-        ("75 %", q(0.75)),
-        ("95 %", q(0.95)),
-        ("99 %", q(0.99)),
-        ("largest", q(1.0)),
-        ("mean ln Y, 60° to 90°", mean(0..11, &|k| log[k])),
-        ("30° to 60°", mean(11..21, &|k| log[k])),
-        ("10° to 30°", mean(21..28, &|k| log[k])),
-        ("0° to 10°", mean(28..32, &|k| log[k])),
-        ("−10° to 0°", mean(32..36, &|k| log[k])),
-        ("−30° to −10°", mean(36..43, &|k| log[k])),
-        ("−90° to −30°", mean(43..64, &|k| log[k])),
-        ("upper half less lower", mean(0..32, &|k| log[k]) - mean(32..64, &|k| log[k])),
-        ("sd of ln Y along rows within 33° of the horizon", row_sd),
-        ("neighbours' |Δ ln Y|, above", mean(4..32, &step)),
-        ("neighbours' |Δ ln Y|, below", mean(32..60, &step)),
-        ("mean ln R/G, above", mean(0..32, &|k| ratio(k, 0, 1))),
-        ("mean ln R/G, below", mean(32..64, &|k| ratio(k, 0, 1))),
-        ("mean ln B/G, above", mean(0..32, &|k| ratio(k, 2, 1))),
-        ("mean ln B/G, below", mean(32..64, &|k| ratio(k, 2, 1))),
-        ("sd of ln B/R", sd(0..64, &chroma)),
-    ]
-}
+use statistics::{GRID, statistics};
 
 fn sheet(path: &Path, panoramas: &[Panorama]) -> Result<(), Box<dyn Error>> {
     let columns = 8;
@@ -138,7 +82,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [real, made] = [real, made].map(|set| set.iter().map(statistics).collect::<Vec<_>>());
     for k in 0..real[0].len() {
         let cell = |set: &[Vec<(&str, f32)>]| {
-            let values: Vec<f32> = set.iter().map(|s| s[k].1).collect();
+            // what a panorama does not have is not a number
+            let values: Vec<f32> = set.iter().map(|s| s[k].1).filter(|v| !v.is_nan()).collect();
+            if set[0][k].0.ends_with("(mean)") {
+                return format!("{:.2}", values.iter().sum::<f32>() / values.len() as f32);
+            }
             let [low, middle, high] = [0.25, 0.5, 0.75].map(|at| quantile(&values, at));
             format!("{middle:.2} ({low:.2} to {high:.2})")
         };
