@@ -145,9 +145,9 @@ impl<'a> Stage<'a> {
             let from = if cosine > 0.0 { start } else { point - normal * 0.02 };
             if self.lit(from, k) {
                 if cosine > 0.0 {
-                    front += *light * cosine * weigh(*towards)
+                    front += *light * cosine * weigh(*towards);
                 } else {
-                    back -= *light * cosine
+                    back -= *light * cosine;
                 }
             }
         }

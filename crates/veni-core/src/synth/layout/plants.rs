@@ -33,7 +33,11 @@ impl Builder {
                 (grove, spread) = (alone, self.draw.range(2.0, 9.0));
             }
             let off = Vec2::new(self.draw.normal(0.0, spread), self.draw.normal(0.0, spread));
-            let at = if (grove + off).length() > near && (k / GROVE) % 2 == 0 { grove + off } else { alone };
+            let at = if (grove + off).length() > near && (k / GROVE).is_multiple_of(2) {
+                grove + off
+            } else {
+                alone
+            };
             let height = self.draw.log_range(4.0, 18.0);
             if self.draw.chance(0.25) { self.conifer(at, height) } else { self.broadleaf(at, height) }
         }
