@@ -148,7 +148,6 @@ fn varied() -> AugmentConfig {
         mirror: 0.5,
         exposure: 0.1,
         white_balance: 0.1,
-        lobes: 0.0,
         contrast: 0.15,
         polar_warp: 0.4,
         recombine: 0.4,

@@ -13,11 +13,9 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 mod combine;
-mod relight;
 mod warp;
 
 pub use combine::{join, mix, recombine};
-pub use relight::{add_per_channel, lobes};
 pub use warp::{azimuth_warp, mirror, polar_warp, turn_columns};
 
 use crate::data::exposure::centre_exposure;
@@ -36,8 +34,6 @@ pub struct AugmentConfig {
     pub exposure: f64,
     /// Standard deviation of each channel's own factor, in natural-log units.
     pub white_balance: f64,
-    /// Standard deviation of the height of four smooth lobes that are added to log radiance, in natural-log units.
-    pub lobes: f64,
     /// Standard deviation of ln γ, where log radiance is multiplied by γ.
     pub contrast: f64,
     /// Largest amplitude, in (0, 1), of the monotone warp θ → θ + a·sin(2θ)/2 that fixes poles and horizon.
@@ -71,7 +67,6 @@ impl AugmentConfig {
             ("mirror", self.mirror, 1.0),
             ("exposure", self.exposure, 20.0),
             ("white_balance", self.white_balance, 5.0),
-            ("lobes", self.lobes, 5.0),
             ("contrast", self.contrast, 2.0),
             ("polar_warp", self.polar_warp, 0.99),
             ("recombine", self.recombine, 1.0),
@@ -135,10 +130,6 @@ impl AugmentConfig {
             out.iter_mut().for_each(|v| *v *= gamma);
             touched = true;
         }
-        if self.lobes > 0.0 {
-            lobes(grid, &mut out, self.lobes, rng);
-            touched = true;
-        }
         if self.white_balance > 0.0 {
             let gains = [0; 3].map(|_| (self.white_balance * normal(rng)) as f32);
             add_per_channel(&mut out, gains);
@@ -174,6 +165,12 @@ fn happens(rng: &mut impl Rng, probability: f64) -> bool {
     probability > 0.0 && uniform(rng) < probability
 }
 
+fn add_per_channel(image: &mut [f32], gains: [f32; 3]) {
+    for pixel in image.chunks_exact_mut(3) {
+        pixel.iter_mut().zip(gains).for_each(|(v, g)| *v += g);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -195,7 +192,6 @@ mod tests {
             mirror: 0.5,
             exposure: 0.0,
             white_balance: 0.2,
-            lobes: 0.2,
             contrast: 0.2,
             polar_warp: 0.5,
             recombine: 0.7,
