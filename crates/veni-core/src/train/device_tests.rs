@@ -105,13 +105,8 @@ fn deviations(ours: &Step, other: &Step) -> [f64; 3] {
         let apart = a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs()));
         apart.fold(0.0, |m, d| if d.is_nan() { f64::INFINITY } else { m.max(d) }) / (allowed * largest)
     };
-    let gradients = ours.gradients.iter().map(|(name, g)| {
-        let deviation = apart(&g.data, &other.gradients[name].data, 2e-4, 1e-4);
-        if deviation > 0.5 {
-            say(&format!("{name}: {deviation:.2} of what is allowed"));
-        }
-        deviation
-    });
+    let gradients = ours.gradients.iter();
+    let gradients = gradients.map(|(name, g)| apart(&g.data, &other.gradients[name].data, 2e-4, 1e-4));
     let gradients = gradients.fold(0.0, f64::max);
     [losses, gradients, apart(&ours.encoded, &other.encoded, 2e-5, 1e-4)]
 }
@@ -127,7 +122,8 @@ fn every_device_computes_the_same_step() {
     reni.latents.as_mut().unwrap().free_exposure = true;
     for config in [veni, reni] {
         let expected = step_on(DeviceKind::Flex, DecoderBy::Tensors, &config, None);
-        assert!(expected.parts.len() >= 4 && expected.gradients.len() > 20);
+        let (terms, parameters) = (expected.parts.len(), expected.gradients.len());
+        assert!(terms > 3 && parameters > 15, "{terms} losses, {parameters} gradients");
         for kind in devices() {
             for by in [DecoderBy::Tensors, DecoderBy::Kernels] {
                 let found = deviations(&expected, &step_on(kind, by, &config, None));
@@ -150,6 +146,7 @@ fn a_device_that_computes_something_else_is_caught() {
         let mut broken = weights.clone();
         let named = broken.iter_mut().filter(|(name, _)| name.starts_with(part));
         let (name, weight) = named.max_by_key(|(_, weight)| weight.data.len()).unwrap();
+        let name = name.clone();
         weight.data.iter_mut().for_each(|w| *w *= 1.001);
         let found = deviations(&expected, &step_on(kind, DecoderBy::Tensors, &config, Some(&broken)));
         assert!(found[at] > 3.0, "{name}: {found:?}");

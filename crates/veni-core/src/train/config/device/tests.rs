@@ -27,7 +27,10 @@ fn a_graphics_device_brings_the_tensor_decoder_along() {
     assert_eq!(read(&text), DecoderBy::Tensors);
     assert_eq!(read(&text.replace(line, "")), DecoderBy::Tensors);
     assert_eq!(read(&text.replace(line, "decoder_by = \"kernels\"\n")), DecoderBy::Kernels);
-    assert_eq!(read(&config.to_toml().unwrap().replace("decoder_by = \"kernels\"\n", "")), DecoderBy::Kernels);
+    assert_eq!(
+        read(&config.to_toml().unwrap().replace("decoder_by = \"kernels\"\n", "")),
+        DecoderBy::Kernels
+    );
 }
 
 #[test]
