@@ -30,7 +30,9 @@ fn devices() -> Vec<DeviceKind> {
             Err(error) => {
                 let known = std::env::var("VENI_SKIP_GPU").is_ok_and(|v| v == "1");
                 assert!(known, "{error}, or set VENI_SKIP_GPU=1");
-                say(&format!("VENI_SKIP_GPU=1: training on wgpu is not tested ({error})"));
+                let thread = std::thread::current();
+                let test = thread.name().unwrap_or("a test of devices").to_owned();
+                say(&format!("{test}: wgpu skipped, since VENI_SKIP_GPU=1 is set ({error})"));
             }
         }
     }
@@ -123,7 +125,7 @@ fn every_device_computes_the_same_step() {
     for config in [veni, reni] {
         let expected = step_on(DeviceKind::Flex, DecoderBy::Tensors, &config, None);
         let (terms, parameters) = (expected.parts.len(), expected.gradients.len());
-        assert!(terms > 3 && parameters > 15, "{terms} losses, {parameters} gradients");
+        assert!(terms >= 3 && parameters > 15, "{terms} losses, {parameters} gradients");
         for kind in devices() {
             for by in [DecoderBy::Tensors, DecoderBy::Kernels] {
                 let found = deviations(&expected, &step_on(kind, by, &config, None));
