@@ -3,6 +3,6 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/setup.sh
-# The ndarray device is built in as well, so that the golden numbers run on both CPU devices.
-cargo test --release --workspace --features veni/gpu,veni/ndarray,veni-cli/ndarray "$@"
+# ndarray: the golden numbers run on both CPU devices. wgpu: training runs on the graphics device too.
+cargo test --release --workspace --features veni/gpu,veni/ndarray,veni/wgpu,veni-cli/ndarray,veni-cli/wgpu "$@"
 scripts/check-worlds.sh

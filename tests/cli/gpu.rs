@@ -7,7 +7,7 @@ use crate::readers::exr;
 use crate::util::{Dir, finish, model};
 
 /// Whether a test that needs an adapter is to be left out; says so.
-fn skipped(test: &str) -> bool {
+pub(crate) fn skipped(test: &str) -> bool {
     let skip = std::env::var_os("VENI_SKIP_GPU").is_some_and(|v| v == "1");
     if skip {
         eprintln!("{test}: skipped, since VENI_SKIP_GPU=1 is set");
@@ -16,7 +16,7 @@ fn skipped(test: &str) -> bool {
 }
 
 /// What `inspect --devices` says of every adapter.
-fn devices(dir: &Dir) -> Vec<Value> {
+pub(crate) fn devices(dir: &Dir) -> Vec<Value> {
     let run = dir.run(&["inspect", "--devices", "--json", "--quiet"]);
     assert_eq!(
         run.code,
@@ -28,7 +28,7 @@ fn devices(dir: &Dir) -> Vec<Value> {
 }
 
 /// The command on a machine without any Vulkan driver.
-fn without_drivers(dir: &Dir, args: &[&str]) -> std::process::Command {
+pub(crate) fn without_drivers(dir: &Dir, args: &[&str]) -> std::process::Command {
     let mut command = dir.command(args);
     for variable in ["VK_ICD_FILENAMES", "VK_DRIVER_FILES"] {
         command.env(variable, dir.path("no such driver.json"));

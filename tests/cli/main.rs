@@ -15,5 +15,6 @@ mod readers;
 mod render_probe;
 mod shards;
 mod synth;
+mod train_devices;
 mod training;
 mod util;

@@ -59,7 +59,7 @@ fn main() -> Result<()> {
     for batch in &batches {
         let clock = Instant::now();
         let (terms, gradients) = network.gradients(batch, &loss, config.decoder_by, &device);
-        losses.push(terms.total().into_scalar::<f32>());
+        losses.push(terms.values().0);
         if let (Some(path), 1) = (record_to, batch.step()) {
             record(path, &network, batch, terms, &gradients)?;
         }

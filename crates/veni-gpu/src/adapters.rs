@@ -29,12 +29,17 @@ pub struct Opened {
 }
 
 /// All adapters that can run the decoder, graphics cards first, then integrated ones, then software. The usual variables
-/// of wgpu (`WGPU_BACKEND`, …) limit the choice.
+/// of wgpu (`WGPU_BACKEND`, …) limit the choice, or widen it to OpenGL where that is compiled in.
 pub async fn list() -> Vec<Found> {
     if Instance::enabled_backend_features().is_empty() {
         return Vec::new();
     }
-    let instance = Instance::new(InstanceDescriptor::new_without_display_handle_from_env());
+    let mut descriptor = InstanceDescriptor::new_without_display_handle_from_env();
+    if std::env::var_os("WGPU_BACKEND").is_none() {
+        // burn switches OpenGL on in the wgpu of a whole program, where it would list the same adapters once more
+        descriptor.backends &= wgpu::Backends::PRIMARY;
+    }
+    let instance = Instance::new(descriptor);
     let adapters = instance.enumerate_adapters(wgpu::Backends::all()).await;
     let mut found: Vec<_> = adapters
         .into_iter()

@@ -13,7 +13,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use veni_core::model::ModelKind;
-use veni_core::train::config::DeviceKind;
+use veni_core::train::config::{DecoderBy, DeviceKind, TrainConfig};
 use veni_core::train::init::Initialised;
 use veni_core::train::presets::Preset;
 use veni_core::train::run::{Finish, Trainer};
@@ -112,7 +112,7 @@ pub(crate) struct Train {
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 
-    /// What computes
+    /// What computes [default: flex, or what the file of --config says]
     #[arg(long, value_enum)]
     device: Option<TrainDevice>,
 
@@ -157,24 +157,29 @@ impl From<PresetName> for Preset {
     }
 }
 
-/// What was compiled in.
+/// The devices by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TrainDevice {
-    /// The fastest one of this build: flex
+    /// The fastest of this build and machine: cuda, then wgpu on a graphics card, then flex
     Auto,
     /// All CPU cores, through burn's flex backend
     Flex,
-    /// All CPU cores, through burn's ndarray backend
-    #[cfg(feature = "ndarray")]
+    /// All CPU cores, through burn's ndarray backend (feature ndarray)
     Ndarray,
+    /// A graphics device by Vulkan, Metal or DirectX 12 (feature wgpu)
+    Wgpu,
+    /// An NVIDIA card by CUDA (feature cuda)
+    Cuda,
 }
 
 impl From<TrainDevice> for DeviceKind {
     fn from(device: TrainDevice) -> Self {
         match device {
-            TrainDevice::Auto | TrainDevice::Flex => Self::Flex,
-            #[cfg(feature = "ndarray")]
+            TrainDevice::Auto => Self::fastest(),
+            TrainDevice::Flex => Self::Flex,
             TrainDevice::Ndarray => Self::Ndarray,
+            TrainDevice::Wgpu => Self::Wgpu,
+            TrainDevice::Cuda => Self::Cuda,
         }
     }
 }
@@ -184,6 +189,7 @@ impl Train {
         crate::allocator::keep_memory();
         let started = Instant::now();
         let mut trainer = if self.resume { self.continued(report)? } else { self.begun(report)? };
+        note_device(trainer.config(), report)?;
         if trainer.initialised() == Some(Initialised::Decoder) {
             let model = trainer.config().init.as_ref().map(|init| init.model.display().to_string());
             report.note(format_args!(
@@ -278,6 +284,23 @@ impl Train {
         });
         report.result(human, &value)
     }
+}
+
+/// What a graphics device is, and what about it will be slow.
+fn note_device(config: &TrainConfig, report: Report) -> Result<()> {
+    let kind = config.device;
+    if kind.decoder_by() == DecoderBy::Kernels {
+        return Ok(());
+    }
+    let opened = kind.open()?;
+    report.note(format_args!("training on {}", opened.name));
+    if opened.software {
+        report.note(format_args!("{} is a software adapter; --device flex is faster", opened.name));
+    }
+    if config.decoder_by == DecoderBy::Kernels {
+        report.note("decoder_by = kernels: the decoder is computed by the processor, not on the device");
+    }
+    Ok(())
 }
 
 /// Raised by the first Ctrl-C (or a request to terminate); the second one ends the process.

@@ -4,6 +4,8 @@
 pub mod batch;
 pub mod checkpoint;
 pub mod config;
+#[cfg(test)]
+mod device_tests;
 mod draws;
 pub mod init;
 pub mod latents;

@@ -226,10 +226,8 @@ impl Trainer {
     fn part(&self, loss: &Loss, batch: &Prepared) -> Computed {
         let by = self.config.decoder_by;
         let (terms, gradients) = self.network.gradients(batch, loss, by, &self.device);
-        let value = f64::from(terms.total().into_scalar::<f32>());
-        let gradients = weights::gradients(&self.network, "", &gradients);
-        let number = |t: crate::train::loss::Term| (t.name, f64::from(t.value.into_scalar::<f32>()));
-        Computed { value, parts: terms.terms.into_iter().map(number).collect(), gradients }
+        let (value, parts) = terms.values();
+        Computed { value, parts, gradients: weights::gradients(&self.network, "", &gradients) }
     }
 
     fn checkpoint(&self, log: &MetricsLog, progress: &mut dyn Progress) -> Result<()> {

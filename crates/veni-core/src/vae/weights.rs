@@ -5,7 +5,7 @@
 
 use crate::{Error, Result};
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
-use burn::tensor::{Gradients, Tensor, TensorData};
+use burn::tensor::{Gradients, Tensor, TensorData, Transaction};
 use std::collections::BTreeMap;
 
 /// The values of one parameter, row-major.
@@ -84,13 +84,20 @@ impl Path {
 struct Reader<'a> {
     path: Path,
     gradients: Option<&'a Gradients>,
-    found: Weights,
+    /// Names and shapes, in the order of `values`.
+    found: Vec<(String, Vec<usize>)>,
+    /// All tensors in one reading: a graphics device is waited for once, not once for each.
+    values: Transaction,
 }
 
 fn collect<M: Module>(module: &M, prefix: &str, gradients: Option<&Gradients>) -> Weights {
-    let mut reader = Reader { path: Path::new(prefix), gradients, found: Weights::new() };
+    let (path, found) = (Path::new(prefix), Vec::new());
+    let mut reader = Reader { path, gradients, found, values: Transaction::default() };
     module.visit(&mut reader);
-    reader.found
+    let numbers = |data: TensorData| data.convert::<f32>().try_into_vec().expect("just converted to f32");
+    (reader.found.into_iter().zip(reader.values.execute()))
+        .map(|((name, shape), data)| (name, Weight { shape, data: numbers(data) }))
+        .collect()
 }
 
 impl ModuleVisitor for Reader<'_> {
@@ -108,9 +115,8 @@ impl ModuleVisitor for Reader<'_> {
             Some(gradients) => param.val().grad(gradients),
         };
         if let Some(tensor) = tensor {
-            let shape = tensor.dims().to_vec();
-            let data = tensor.into_data().convert::<f32>().try_into_vec().expect("just converted to f32");
-            self.found.insert(self.path.dotted(), Weight { shape, data });
+            self.found.push((self.path.dotted(), tensor.dims().to_vec()));
+            self.values = std::mem::take(&mut self.values).register(tensor);
         }
     }
 }

@@ -36,7 +36,7 @@ impl Train {
             config.seed = seed;
         }
         if let Some(device) = self.device {
-            config.device = device.into();
+            config.set_device(device.into());
         }
         if let Some(steps) = self.steps {
             config = config.with_overrides(&[format!("steps={steps}")])?;

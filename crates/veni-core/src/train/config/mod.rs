@@ -11,7 +11,7 @@ mod tests;
 
 use serde::{Deserialize, Serialize};
 
-pub use device::{DecoderBy, DeviceKind};
+pub use device::{DecoderBy, DeviceKind, Opened};
 pub use loss_grid::LossGrid;
 pub use report::{ReportConfig, Stored};
 pub use stage::{Stage, StageConfig};
@@ -44,7 +44,8 @@ pub struct TrainConfig {
     pub order: Order,
     /// Where gradients are computed.
     pub device: DeviceKind,
-    /// What computes the decoder and its gradients.
+    /// What computes the decoder and its gradients. A file that does not say it means what is best on its device
+    /// ([`DeviceKind::decoder_by`]).
     #[serde(default)]
     pub decoder_by: DecoderBy,
     /// Decay of the averaged weights, which are validated and become the model; 0 takes the last weights.
@@ -112,7 +113,10 @@ impl TrainConfig {
     /// # Errors
     /// [`Error::Invalid`] naming the key and line that do not fit.
     pub fn from_toml(text: &str) -> Result<Self> {
-        let config: Self = toml::from_str(text).map_err(|e| Error::invalid(e.to_string()))?;
+        let mut config: Self = toml::from_str(text).map_err(|e| Error::invalid(e.to_string()))?;
+        if toml::from_str::<toml::Table>(text).is_ok_and(|table| !table.contains_key("decoder_by")) {
+            config.decoder_by = config.device.decoder_by();
+        }
         config.check()?;
         Ok(config)
     }
@@ -124,6 +128,13 @@ impl TrainConfig {
     pub fn to_toml(&self) -> Result<String> {
         toml::to_string_pretty(self)
             .map_err(|e| Error::invalid(format!("the configuration has no TOML form: {e}")))
+    }
+
+    /// Another device, and with it what computes the decoder best there.
+    pub fn set_device(&mut self, device: DeviceKind) {
+        if self.device != device {
+            (self.device, self.decoder_by) = (device, device.decoder_by());
+        }
     }
 
     /// Parameter groups, by the first part of their parameters' paths: `decoder`, and `encoder` or `latents`.

@@ -14,8 +14,10 @@ pub mod stencil;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
 use super::schedule::WeightSchedule;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, Transaction};
 use mage::MageForm;
 use mse::Space;
 use serde::{Deserialize, Serialize};
@@ -109,6 +111,18 @@ impl LossTerms {
     pub fn total(&self) -> Tensor<1> {
         let values = self.terms.iter().map(|t| t.value.clone());
         values.reduce(|a, b| a + b).expect("a loss with at least one weight that is not 0")
+    }
+
+    /// Their sum and each of them, in one reading from the device.
+    ///
+    /// # Panics
+    /// If every weight is 0.
+    pub fn values(&self) -> (f64, BTreeMap<&'static str, f64>) {
+        let all = std::iter::once(self.total()).chain(self.terms.iter().map(|t| t.value.clone()));
+        let read = all.fold(Transaction::default(), Transaction::register).execute();
+        let mut numbers = read.into_iter().flat_map(|data| data.convert::<f64>().try_into_vec::<f64>());
+        let mut next = || numbers.next().expect("as many values as terms")[0];
+        (next(), self.terms.iter().map(|t| (t.name, next())).collect())
     }
 
     /// One weighted term.

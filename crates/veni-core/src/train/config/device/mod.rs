@@ -1,0 +1,120 @@
+//! Where gradients are computed.
+//!
+//! | kind | feature | what computes |
+//! |---|---|---|
+//! | `flex` | | all cores of the processor |
+//! | `ndarray` | `ndarray` | all cores of the processor, through ndarray |
+//! | `wgpu` | `wgpu` | a graphics device by Vulkan, Metal or DirectX 12, on what wgpu takes for the fastest |
+//! | `cuda` | `cuda` | the first CUDA device (`CUDA_VISIBLE_DEVICES` orders them) |
+//!
+//! A device that is not there is an error with its remedy: nothing falls back to another.
+
+#[cfg(feature = "cuda")]
+mod cuda;
+#[cfg(test)]
+mod tests;
+#[cfg(feature = "wgpu")]
+mod wgpu;
+
+use burn::tensor::Device;
+use serde::{Deserialize, Serialize};
+
+use crate::Result;
+
+/// What computes the decoder and its gradients in training: the same numbers up to rounding.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DecoderBy {
+    /// The vectorised kernels of [`field`](crate::field), on the processor ([`Native`](crate::vae::Native)) whatever
+    /// the device. A network that does not fold per latent is computed by tensor operations all the same.
+    #[default]
+    Kernels,
+    /// Tensor operations on the device.
+    Tensors,
+}
+
+/// Where gradients are computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeviceKind {
+    /// burn's flex CPU backend.
+    #[default]
+    Flex,
+    /// burn's ndarray CPU backend (feature `ndarray`).
+    Ndarray,
+    /// burn's wgpu backend (feature `wgpu`).
+    Wgpu,
+    /// burn's CUDA backend (feature `cuda`).
+    Cuda,
+}
+
+/// A device that was found to work.
+#[derive(Clone, Debug)]
+pub struct Opened {
+    /// Without gradient tracking.
+    pub device: Device,
+    /// The adapter's own name; of a processor burn's name of the backend.
+    pub name: String,
+    /// Whether it is a graphics device that the processor imitates, such as Mesa's lavapipe.
+    pub software: bool,
+}
+
+impl DeviceKind {
+    /// The fastest of this build and machine: CUDA, then a graphics card, then flex. A graphics device that the
+    /// processor imitates is slower than the processor itself, and not taken.
+    pub fn fastest() -> Self {
+        let real = |kind: Self| kind.open().is_ok_and(|opened| !opened.software);
+        [Self::Cuda, Self::Wgpu].into_iter().find(|kind| real(*kind)).unwrap_or(Self::Flex)
+    }
+
+    /// What computes the decoder best here: kernels on a processor, tensor operations on any other device, whose data
+    /// would have to come to the processor and back.
+    pub fn decoder_by(self) -> DecoderBy {
+        match self {
+            Self::Flex | Self::Ndarray => DecoderBy::Kernels,
+            Self::Wgpu | Self::Cuda => DecoderBy::Tensors,
+        }
+    }
+
+    /// The device, without gradient tracking.
+    ///
+    /// # Errors
+    /// As [`DeviceKind::open`].
+    pub fn device(self) -> Result<Device> {
+        self.open().map(|opened| opened.device)
+    }
+
+    /// The device and what it is.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`](crate::Error::Unsupported) if it is not compiled in, or this machine has none.
+    pub fn open(self) -> Result<Opened> {
+        match self {
+            Self::Flex => Ok(processor(Device::flex(), "flex")),
+            #[cfg(feature = "ndarray")]
+            #[allow(deprecated, reason = "kept and tested while burn ships it")]
+            Self::Ndarray => Ok(processor(Device::ndarray(), "ndarray")),
+            #[cfg(not(feature = "ndarray"))]
+            Self::Ndarray => Err(not_compiled_in("ndarray")),
+            #[cfg(feature = "wgpu")]
+            Self::Wgpu => wgpu::open(),
+            #[cfg(not(feature = "wgpu"))]
+            Self::Wgpu => Err(not_compiled_in("wgpu")),
+            #[cfg(feature = "cuda")]
+            Self::Cuda => cuda::open(),
+            #[cfg(not(feature = "cuda"))]
+            Self::Cuda => Err(not_compiled_in("cuda")),
+        }
+    }
+}
+
+fn processor(device: Device, name: &str) -> Opened {
+    Opened { device, name: name.into(), software: false }
+}
+
+#[cfg(not(all(feature = "ndarray", feature = "wgpu", feature = "cuda")))]
+fn not_compiled_in(name: &str) -> crate::Error {
+    crate::Error::unsupported(format!(
+        "device {name} is not compiled in: build with --features {name}, or take device flex"
+    ))
+}

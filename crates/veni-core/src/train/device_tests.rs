@@ -1,0 +1,156 @@
+//! One step, and a short run, on every device of this build: flex, ndarray (feature), wgpu (feature).
+//!
+//! Without a graphics adapter the tests fail, unless `VENI_SKIP_GPU=1` says that this is known; then they say that they
+//! went without.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+
+use crate::data::{Dataset, Item};
+use crate::panorama::Panorama;
+use crate::sphere::Equirect;
+use crate::train::config::{DecoderBy, DeviceKind, TrainConfig};
+use crate::train::network::{Network, Prepared};
+use crate::train::presets::Preset;
+use crate::train::schedule::WeightSchedule;
+use crate::train::step;
+use crate::vae::weights::{self, Weights};
+
+/// All but the cuda device, which needs a card.
+fn devices() -> Vec<DeviceKind> {
+    let mut kinds = vec![DeviceKind::Flex];
+    kinds.extend(cfg!(feature = "ndarray").then_some(DeviceKind::Ndarray));
+    if cfg!(feature = "wgpu") {
+        match DeviceKind::Wgpu.open() {
+            Ok(opened) => {
+                say(&format!("wgpu: {}, software: {}", opened.name, opened.software));
+                kinds.push(DeviceKind::Wgpu);
+            }
+            Err(error) => {
+                let known = std::env::var("VENI_SKIP_GPU").is_ok_and(|v| v == "1");
+                assert!(known, "{error}, or set VENI_SKIP_GPU=1");
+                let thread = std::thread::current();
+                let test = thread.name().unwrap_or("a test of devices").to_owned();
+                say(&format!("{test}: wgpu skipped, since VENI_SKIP_GPU=1 is set ({error})"));
+            }
+        }
+    }
+    kinds
+}
+
+/// Past the test framework's capture.
+fn say(line: &str) {
+    let _ = std::io::stderr().write_all(format!("{line}\n").as_bytes());
+}
+
+/// Two skies with a sun each over dark ground.
+fn skies() -> Dataset {
+    let grid = Equirect::new(32, 16);
+    let sky = |azimuth: f32| {
+        let sun = [azimuth.cos() * 0.8, azimuth.sin() * 0.8, 0.6];
+        let panorama = Panorama::from_fn(grid, |d| {
+            let toward = d.iter().zip(sun).map(|(a, b)| a * b).sum::<f32>();
+            let base = if d[2] > 0.0 { [0.4, 0.6, 1.0] } else { [0.12, 0.1, 0.08] };
+            base.map(|v| v + 20.0 * (12.0 * (toward - 1.0)).exp())
+        });
+        Item::new(Path::new("sky"), &panorama, grid)
+    };
+    Dataset::new(grid, vec![sky(0.3), sky(2.0)])
+}
+
+/// What one step says.
+struct Step {
+    total: f64,
+    parts: BTreeMap<&'static str, f64>,
+    gradients: Weights,
+    /// Mean and log variance of the posterior; nothing of an auto-decoder.
+    encoded: Vec<f32>,
+}
+
+/// The step of `batch` on a device, from the weights of the configuration's seed or from others.
+fn step_on(kind: DeviceKind, by: DecoderBy, config: &TrainConfig, from: Option<&Weights>) -> Step {
+    let device = kind.device().unwrap().autodiff();
+    let skies = skies();
+    let mut network = Network::new(config, skies.len(), &device).unwrap();
+    if let Some(weights) = from {
+        network = weights::write(network, "", weights).unwrap();
+    }
+    let batch = network.source(config, &skies).unwrap().prepare(1);
+    let loss = Network::loss(config, &device);
+    let (terms, gradients) = network.gradients(&batch, &loss, by, &device);
+    let (total, parts) = terms.values();
+    let encoded = match (&network, &batch) {
+        (Network::Veni(veni), Prepared::Panoramas(batch)) => {
+            let posterior = step::encode(veni, batch, &device);
+            let spread = posterior.log_variance.expect("a variational encoder");
+            [posterior.mean, spread].into_iter().flat_map(|t| t.into_data().try_into_vec().unwrap()).collect()
+        }
+        _ => Vec::new(),
+    };
+    Step { total, parts, gradients: weights::gradients(&network, "", &gradients), encoded }
+}
+
+/// The largest deviations of losses, gradients and the encoder's output, each in units of what is allowed.
+///
+/// Allowed are 2e-5 of a loss, 2e-4 of a parameter's largest gradient (or of 1e-4, where it vanishes) and 2e-5 of the
+/// largest coordinate: devices add up in another order, and a sum over a few thousand numbers of either sign loses two
+/// or three of f32's seven digits in a gradient.
+fn deviations(ours: &Step, other: &Step) -> [f64; 3] {
+    assert!(ours.parts.keys().eq(other.parts.keys()) && ours.gradients.keys().eq(other.gradients.keys()));
+    let loss = |a: f64, b: f64| (a - b).abs() / (2e-5 * a.abs().max(1e-3));
+    let parts = ours.parts.iter().map(|(name, value)| loss(*value, other.parts[name]));
+    let losses = parts.fold(loss(ours.total, other.total), f64::max);
+    let apart = |a: &[f32], b: &[f32], allowed: f64, least: f32| {
+        assert_eq!(a.len(), b.len());
+        let largest = f64::from(a.iter().fold(least, |m, v| m.max(v.abs())));
+        let apart = a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs()));
+        apart.fold(0.0, |m, d| if d.is_nan() { f64::INFINITY } else { m.max(d) }) / (allowed * largest)
+    };
+    let gradients = ours.gradients.iter();
+    let gradients = gradients.map(|(name, g)| apart(&g.data, &other.gradients[name].data, 2e-4, 1e-4));
+    let gradients = gradients.fold(0.0, f64::max);
+    [losses, gradients, apart(&ours.encoded, &other.encoded, 2e-5, 1e-4)]
+}
+
+#[test]
+fn every_device_computes_the_same_step() {
+    let mut veni = Preset::Tiny.config(3);
+    for schedule in [&mut veni.loss.log_mse, &mut veni.loss.hdr_mse, &mut veni.loss.ldr_mse] {
+        *schedule = WeightSchedule::Constant(0.3);
+    }
+    let mut reni = Preset::Tiny.auto_decoder(3);
+    reni.loss.kld = WeightSchedule::Constant(0.01);
+    reni.latents.as_mut().unwrap().free_exposure = true;
+    for config in [veni, reni] {
+        let expected = step_on(DeviceKind::Flex, DecoderBy::Tensors, &config, None);
+        let (terms, parameters) = (expected.parts.len(), expected.gradients.len());
+        assert!(terms >= 3 && parameters > 15, "{terms} losses, {parameters} gradients");
+        for kind in devices() {
+            for by in [DecoderBy::Tensors, DecoderBy::Kernels] {
+                let found = deviations(&expected, &step_on(kind, by, &config, None));
+                say(&format!("{:?}: {kind:?} by {by:?}: {found:.3?} of what is allowed", config.model.kind));
+                assert!(found.iter().all(|d| *d < 1.0), "{kind:?}, {by:?}: {found:?} of what is allowed");
+            }
+        }
+    }
+}
+
+/// A weight that is off by a thousandth of itself, of the encoder or of the decoder, is seen by the comparison.
+#[test]
+fn a_device_that_computes_something_else_is_caught() {
+    let config = Preset::Tiny.config(3);
+    let kind = *devices().last().unwrap();
+    let device = kind.device().unwrap();
+    let weights = weights::read(&Network::new(&config, 2, &device).unwrap(), "");
+    let expected = step_on(DeviceKind::Flex, DecoderBy::Tensors, &config, None);
+    for (part, at) in [("encoder.", 2), ("decoder.", 1)] {
+        let mut broken = weights.clone();
+        let named = broken.iter_mut().filter(|(name, _)| name.starts_with(part));
+        let (name, weight) = named.max_by_key(|(_, weight)| weight.data.len()).unwrap();
+        let name = name.clone();
+        weight.data.iter_mut().for_each(|w| *w *= 1.001);
+        let found = deviations(&expected, &step_on(kind, DecoderBy::Tensors, &config, Some(&broken)));
+        assert!(found[at] > 3.0, "{name}: {found:?}");
+    }
+}

@@ -1,0 +1,90 @@
+//! `train --device`: what is chosen, what it says, and what happens where it is missing. That devices compute the same
+//! numbers is tested in veni-core (`train::device_tests`).
+
+use crate::util::{Dir, panoramas, text, train_args};
+
+fn args<'a>(data: &'a str, out: &'a str, device: &'a str) -> Vec<&'a str> {
+    [&train_args(data, out, "2")[..], &["--device", device]].concat()
+}
+
+/// A line of a run's `config.toml`.
+fn configured(dir: &Dir, run: &str, key: &str) -> String {
+    let config = std::fs::read_to_string(dir.path(run).join("config.toml")).unwrap();
+    let line = config.lines().find_map(|line| line.strip_prefix(key)?.trim().strip_prefix("= "));
+    line.unwrap_or_else(|| panic!("{key} is not in {config}")).trim_matches('"').to_owned()
+}
+
+#[test]
+fn a_device_that_is_missing_names_the_remedy() {
+    let dir = Dir::new();
+    let data = text(panoramas());
+    if cfg!(not(feature = "cuda")) {
+        dir.refused(&args(&data, "run", "cuda"), &["device cuda", "not compiled in", "--features cuda"]);
+    }
+    if cfg!(not(feature = "wgpu")) {
+        dir.refused(&args(&data, "run", "wgpu"), &["device wgpu", "not compiled in", "--features wgpu"]);
+    }
+}
+
+/// A Vulkan loader that finds no driver stands in for a machine without a graphics device.
+#[cfg(all(feature = "wgpu", feature = "gpu", target_os = "linux"))]
+#[test]
+fn without_a_graphics_device_auto_takes_the_processor_and_wgpu_is_refused() {
+    use crate::{gpu::without_drivers, util::finish};
+    let dir = Dir::new();
+    let data = text(panoramas());
+    let run = finish(&mut without_drivers(&dir, &args(&data, "run", "wgpu")));
+    assert_eq!((run.code, run.out.as_str(), run.err.lines().count()), (Some(2), "", 1), "{run:?}");
+    for word in ["device wgpu", "no usable graphics adapter", "mesa-vulkan-drivers", "flex"] {
+        assert!(run.err.contains(word), "{word} is missing in {run:?}");
+    }
+    assert!(dir.files().is_empty(), "{:?}", dir.files());
+    let run = finish(&mut without_drivers(&dir, &args(&data, "run", "auto")));
+    assert_eq!((run.code, run.err.as_str()), (Some(0), ""), "{run:?}");
+    assert_eq!(configured(&dir, "run", "device"), "flex");
+    assert_eq!(configured(&dir, "run", "decoder_by"), "kernels");
+}
+
+/// Two updates on the graphics device from the panoramas to the model, and on from its checkpoint.
+#[cfg(all(feature = "wgpu", feature = "gpu"))]
+#[test]
+fn a_run_on_a_graphics_device_is_the_run_on_the_processor() {
+    use crate::gpu::{devices, skipped};
+    use serde_json::Value;
+    if skipped("a_run_on_a_graphics_device_is_the_run_on_the_processor") {
+        return;
+    }
+    let dir = Dir::new();
+    let data = text(panoramas());
+    let loud = |out, device| {
+        let args = args(&data, out, device);
+        args.into_iter().filter(|word| *word != "--quiet").collect::<Vec<_>>()
+    };
+    let run = dir.run(&loud("gpu", "wgpu"));
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let first = &devices(&dir)[0];
+    let (name, software) = (first["device"].as_str().unwrap(), first["kind"] == "software");
+    let said = run.err.lines().find_map(|line| line.strip_prefix("training on "));
+    assert!(said.is_some_and(|said| name.starts_with(said)), "{name}: {run:?}");
+    assert_eq!(run.err.contains("is a software adapter; --device flex is faster"), software, "{run:?}");
+    assert_eq!(configured(&dir, "gpu", "device"), "wgpu");
+    assert_eq!(configured(&dir, "gpu", "decoder_by"), "tensors");
+
+    let run = dir.run(&loud("cpu", "flex"));
+    assert!(run.code == Some(0) && !run.err.contains("training on"), "{run:?}");
+    let losses = |run: &str| -> Vec<f64> {
+        let log = std::fs::read_to_string(dir.path(run).join("metrics.jsonl")).unwrap();
+        let lines = log.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+        lines.filter_map(|line| line["loss"].as_f64()).collect()
+    };
+    let (ours, theirs) = (losses("gpu"), losses("cpu"));
+    assert!(ours.len() == 2 && theirs.len() == 2, "{ours:?} {theirs:?}");
+    // after one step of Adam, whose size does not depend on a gradient's, weights with none to speak of differ
+    for ((a, b), allowed) in ours.iter().zip(&theirs).zip([2e-5, 1e-2]) {
+        assert!((a - b).abs() < allowed * b, "{ours:?} {theirs:?}");
+    }
+    // 'auto' never takes a software adapter
+    dir.ok(&args(&data, "auto", "auto"));
+    let chosen = if software { "flex" } else { "wgpu" };
+    assert!([chosen, "cuda"].contains(&configured(&dir, "auto", "device").as_str()));
+}
