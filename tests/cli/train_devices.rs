@@ -8,6 +8,7 @@ fn args<'a>(data: &'a str, out: &'a str, device: &'a str) -> Vec<&'a str> {
 }
 
 /// A line of a run's `config.toml`.
+#[cfg(feature = "wgpu")]
 fn configured(dir: &Dir, run: &str, key: &str) -> String {
     let config = std::fs::read_to_string(dir.path(run).join("config.toml")).unwrap();
     let line = config.lines().find_map(|line| line.strip_prefix(key)?.trim().strip_prefix("= "));
