@@ -173,8 +173,8 @@ fn a_convolution_sees_neither_seam_nor_poles() {
         // above the first row is the first row, half a turn away
         for (row, next) in [(0, 1), (GRID.height - 1, GRID.height - 2)] {
             let beyond = linear.pixel((column + GRID.width / 2) % GRID.width, row);
-            for c in 0..3 {
-                let value = ldr.values()[row * GRID.width + column][c];
+            let values = ldr.values()[row * GRID.width + column];
+            for (c, value) in values.into_iter().enumerate() {
                 let mean = 2.0 * (beyond[c] + linear.pixel(column, row)[c] + linear.pixel(column, next)[c]);
                 assert!(value < CLIPPED || (done.pixel(column, row)[c] - mean).abs() < 1e-5);
             }
