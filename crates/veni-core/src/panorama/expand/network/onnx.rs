@@ -212,8 +212,9 @@ fn times(shape: &[usize]) -> String {
 /// Why a model was not loaded.
 fn refusal(error: &LoadError) -> Error {
     let text = line(error);
+    let elsewhere = error.kind() == LoadErrorKind::ExternalDataError || text.contains("external data");
     match error.kind() {
-        LoadErrorKind::ExternalDataError => Error::unsupported(
+        _ if elsewhere => Error::unsupported(
             "its weights are in other files; save the model as one file (torch.onnx.export with external_data=False)",
         ),
         LoadErrorKind::OperatorInvalid => {
