@@ -45,9 +45,12 @@ impl OnnxFile {
     }
 
     /// A float constant that is said to be in another file.
-    pub(crate) fn elsewhere(mut self, name: &str, file: &str) -> Self {
-        let location = [bytes(1, b"location"), bytes(2, file.as_bytes())].concat();
-        let tensor = [number(2, FLOAT), bytes(8, name.as_bytes()), bytes(13, &location), number(14, 1)];
+    pub(crate) fn elsewhere(mut self, name: &str, place: &[(&str, &str)]) -> Self {
+        let entry = |(key, value): &(&str, &str)| {
+            bytes(13, &[bytes(1, key.as_bytes()), bytes(2, value.as_bytes())].concat())
+        };
+        let place = place.iter().flat_map(entry).collect();
+        let tensor = [number(2, FLOAT), bytes(8, name.as_bytes()), place, number(14, 1)];
         self.graph.extend(bytes(5, &tensor.concat()));
         self
     }

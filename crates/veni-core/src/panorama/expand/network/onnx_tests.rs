@@ -148,9 +148,13 @@ fn files_that_do_not_fit_are_refused() {
     folder.refused("outs.onnx", &twice.node("Relu", &["x"], "z", &[]).bytes(), &["2 outputs (y, z)"]);
     let unknown = OnnxFile::image([0, 0]).node("Frobnicate", &["x"], "y", &[]).bytes();
     folder.refused("unknown.onnx", &unknown, &["Frobnicate", "operator"]);
-    let split =
-        OnnxFile::image([0, 0]).elsewhere("factor", "weights.bin").node("Mul", &["x", "factor"], "y", &[]);
-    folder.refused("split.onnx", &split.bytes(), &["other files", "external_data=False"]);
+    for place in
+        [&[("location", "weights.bin")][..], &[("location", "w.bin"), ("offset", "0"), ("length", "4")]]
+    {
+        let split =
+            OnnxFile::image([0, 0]).elsewhere("factor", place).node("Mul", &["x", "factor"], "y", &[]);
+        folder.refused("split.onnx", &split.bytes(), &["other files", "external_data=False"]);
+    }
     let missing = OnnxFile::image([0, 0]).node("Mul", &["x", "nowhere"], "y", &[]).bytes();
     folder.refused("missing.onnx", &missing, &["nowhere"]);
     let small = OnnxFile::image([0, 0]).constant("three", &[1, 3, 5, 5], &[1.0; 75]);
