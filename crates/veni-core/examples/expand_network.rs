@@ -3,8 +3,9 @@
 //! ```text
 //! cargo run --release -p veni-core --no-default-features --features onnx --example expand_network -- [CHANNELS [LAYERS]]
 //! ```
-//! The network is made here, of random weights: LAYERS convolutions of 3 × 3 with CHANNELS channels between a first and a last
-//! one (32 and 4 unless given), and a softplus. It sees the panorama at its own 1024 × 512 (and what is beyond its edges).
+//! The network is made here, of random weights: LAYERS convolutions of 3 × 3 with CHANNELS channels between a first and a
+//! last one (32 and 4 unless given), and a softplus. It sees the panorama at its own 1024 × 512 (and what is beyond its
+//! edges).
 
 #![expect(clippy::print_stdout, reason = "an example that prints numbers")]
 

@@ -38,13 +38,14 @@ use store::{Settings, Store};
         street_01_puresky are one capture; numbers of three digits or more are captures of their own) and by content \
         (near-duplicates at another exposure, turned about the vertical or mirrored). The side follows from --seed and the \
         capture's name alone. Files inside folders named train, val or test keep their side, unless a near-duplicate is held out.\n\n\
-        With --expand-with, a network of your own rebuilds what is clipped: an ONNX file with one float input and one float \
-        output, both 1 x 3 x H x W (R, G, B; row 0 is up). It is given the panorama's values in [0, 1], sRGB-coded or linear \
-        (--expand-input), and gives linear radiance or its natural logarithm (--expand-output), white being 1 or in a scale \
-        of its own (--expand-scale match). Display values up to 0.95 stay as they are, from 250/255 they are the network's, but no \
-        darker than stored, and between the two are mixed. Where H and W are free, the panorama is continued round the sides and \
-        over the poles by 64 pixels or more, to sides that are multiples of 32; where they are fixed, it is resampled to them. \
-        Panoramas for which it gives NaN, infinity or negative radiance are refused.\n\n\
+        With --expand-with, a network of your own rebuilds what is clipped: an ONNX file with one float input and \
+        one float output, both 1 x 3 x H x W (R, G, B; row 0 is up). It is given the panorama's values in [0, 1], \
+        sRGB-coded or linear (--expand-input), and gives linear radiance or its natural logarithm \
+        (--expand-output), white being 1 or in a scale of its own (--expand-scale match). Display values up to 0.95 \
+        stay as they are, from 250/255 they are the network's, but no darker than stored, and between the two are \
+        mixed. Where H and W are free, the panorama is continued round the sides and over the poles by 64 pixels or \
+        more, to sides that are multiples of 32; where they are fixed, it is resampled to them. Panoramas for which \
+        it gives NaN, infinity or negative radiance are refused.\n\n\
         Stopped half-way, the same command goes on where it was; run again, it takes in only what is new or changed. \
         --force begins anew and removes what an earlier run wrote into DIR, nothing else.",
     after_help = "Exit code 1: ready, but some files were refused.\n\n\

@@ -1,10 +1,9 @@
 //! Expansion by a network that the user brings, in place of the fitted functions.
 //!
-//! **What the network is given**: one float tensor 1 × 3 × H × W (channels R, G, B; row 0 is up), the panorama's values
-//! in [0, 1], sRGB-coded or linear ([`NetworkInput`]).
-//! **What it gives**: one float tensor of the same shape, radiance or its natural logarithm ([`NetworkOutput`]), in units
-//! of the display's white or in a scale of its own ([`NetworkScale`]). NaN and infinity are errors anywhere, negative radiance
-//! where it would be used.
+//! **What the network is given**: one float tensor 1 × 3 × H × W (channels R, G, B; row 0 is up), the panorama's values in
+//! [0, 1], sRGB-coded or linear ([`NetworkInput`]). **What it gives**: one float tensor of the same shape, radiance or its
+//! natural logarithm ([`NetworkOutput`]), in units of the display's white or in a scale of its own ([`NetworkScale`]). NaN
+//! and infinity are errors anywhere, negative radiance where it would be used.
 //!
 //! **What becomes of it**. With v a stored display value, ℓ its linear value and N the network's radiance for it,
 //!
@@ -46,7 +45,7 @@ pub const LARGEST: Equirect = Equirect { width: 1024, height: 512 };
 /// Display values up to this are kept to the bit.
 pub const KEPT: f32 = 0.95;
 
-/// A network that estimates radiance from an image of limited range. [`OnnxNetwork`] runs ONNX files (feature `onnx`);
+/// A network that estimates radiance from an image of limited range. `OnnxNetwork` runs ONNX files (feature `onnx`);
 /// implement this to run something else.
 pub trait Network: Debug + Send + Sync {
     /// What messages call it: a file's name.

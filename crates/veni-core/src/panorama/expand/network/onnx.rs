@@ -14,8 +14,8 @@ const MAX_BYTES: u64 = 1 << 31;
 /// The size at which a network that takes any is tried when it is loaded, \[height, width\].
 const TRIAL: [usize; 2] = [64, 128];
 
-/// A network from an ONNX file: one float input and one float output of the same shape 1 × 3 × H × W, where sides and batch may be
-/// free. Its weights must be in the file itself.
+/// A network from an ONNX file: one float input and one float output of the same shape 1 × 3 × H × W, where sides and batch
+/// may be free. Its weights must be in the file itself.
 #[derive(Debug)]
 pub struct OnnxNetwork {
     name: String,
