@@ -1,20 +1,41 @@
 //! Whole-system tests: the real binary, in a fresh folder each time, on real panoramas.
-#![cfg(feature = "learn")]
+//!
+//! Most need the learning world. What does not also runs alone: `cargo test -p veni-cli --no-default-features --test cli`.
 
+#[cfg(feature = "learn")]
 mod bad_input;
+#[cfg(feature = "learn")]
 mod bake;
+#[cfg(feature = "learn")]
 mod crashes;
+#[cfg(feature = "learn")]
 mod encode;
+#[cfg(feature = "learn")]
 mod evaluate;
+mod expand_with;
+#[cfg(feature = "learn")]
 mod fit;
-#[cfg(feature = "gpu")]
+#[cfg(all(feature = "learn", feature = "gpu"))]
 mod gpu;
+#[cfg(feature = "learn")]
 mod inspect;
+#[cfg(feature = "onnx")]
+#[path = "../../crates/veni-core/src/panorama/expand/network/onnx_file.rs"]
+#[allow(dead_code, reason = "veni-core's tests use the rest of it")]
+mod onnx_file;
+#[cfg(feature = "learn")]
 mod prepare;
+#[cfg(feature = "learn")]
 mod readers;
+#[cfg(feature = "learn")]
 mod render_probe;
+#[cfg(feature = "learn")]
 mod shards;
+#[cfg(feature = "learn")]
 mod synth;
+#[cfg(feature = "learn")]
 mod train_devices;
+#[cfg(feature = "learn")]
 mod training;
+#[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without the learning world"))]
 mod util;

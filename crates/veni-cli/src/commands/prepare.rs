@@ -1,6 +1,7 @@
 //! `veni-cli prepare`: any pile of panoramas to a checked training folder.
 
 mod contact;
+mod expand;
 mod place;
 mod record;
 mod report;
@@ -11,9 +12,8 @@ mod work;
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
-use clap::{Args, ValueEnum};
-use veni_core::panorama::expand::ExpandOptions;
-use veni_core::panorama::{ReadOptions, Transfer};
+use clap::Args;
+use veni_core::panorama::ReadOptions;
 use veni_core::prepare::{PrepareConfig, Shares};
 use veni_core::sphere::Equirect;
 
@@ -21,6 +21,7 @@ use crate::args::Force;
 use crate::report::{Outcome, Report};
 use crate::shard::Shard;
 use crate::size::Size;
+use expand::Expand;
 use place::Placing;
 use store::{Settings, Store};
 
@@ -37,13 +38,22 @@ use store::{Settings, Store};
         street_01_puresky are one capture; numbers of three digits or more are captures of their own) and by content \
         (near-duplicates at another exposure, turned about the vertical or mirrored). The side follows from --seed and the \
         capture's name alone. Files inside folders named train, val or test keep their side, unless a near-duplicate is held out.\n\n\
+        With --expand-with, a network of your own rebuilds what is clipped: an ONNX file with one float input and \
+        one float output, both 1 x 3 x H x W (R, G, B; row 0 is up). It is given the panorama's values in [0, 1], \
+        sRGB-coded or linear (--expand-input), and gives linear radiance or its natural logarithm \
+        (--expand-output), white being 1 or in a scale of its own (--expand-scale match). Display values up to 0.95 \
+        stay as they are, from 250/255 they are the network's, but no darker than stored, and between the two are \
+        mixed. Where H and W are free, the panorama is continued round the sides and over the poles by 64 pixels or \
+        more, to sides that are multiples of 32; where they are fixed, it is resampled to them. Panoramas for which \
+        it gives NaN, infinity or negative radiance are refused.\n\n\
         Stopped half-way, the same command goes on where it was; run again, it takes in only what is new or changed. \
         --force begins anew and removes what an earlier run wrote into DIR, nothing else.",
     after_help = "Exit code 1: ready, but some files were refused.\n\n\
         Examples:\n  \
         veni-cli prepare panoramas/ -o data && veni-cli train --data data --out run\n  \
         veni-cli prepare hdris/ streets/ -o data --size 256x128 --val 0.1 --test 0.1\n  \
-        veni-cli prepare hdris/ -o data --expand off          no LDR images"
+        veni-cli prepare hdris/ -o data --expand off          no LDR images\n  \
+        veni-cli prepare ldr/ -o data --expand-with hdrcnn.onnx --expand-output log"
 )]
 pub(crate) struct Prepare {
     /// Folders and image files
@@ -74,29 +84,14 @@ pub(crate) struct Prepare {
     #[arg(long)]
     resplit: bool,
 
-    /// What becomes of images with a display's range
-    #[arg(long, value_enum, default_value_t)]
+    #[command(flatten)]
     expand: Expand,
-
-    /// They were encoded by this power instead of the sRGB curve
-    #[arg(long, value_name = "G", value_parser = gamma)]
-    gamma: Option<f32>,
 
     #[command(flatten)]
     shard: Shard,
 
     #[command(flatten)]
     force: Force,
-}
-
-/// What becomes of LDR images.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum Expand {
-    /// Rebuild what is clipped
-    #[default]
-    Auto,
-    /// Refuse them
-    Off,
 }
 
 impl Prepare {
@@ -108,11 +103,8 @@ impl Prepare {
         if self.val + self.test >= 1.0 {
             bail!("--val {} and --test {} leave nothing to train on: give less", self.val, self.test);
         }
-        let expand = (self.expand == Expand::Auto).then(|| ExpandOptions {
-            transfer: self.gamma.map_or(Transfer::Srgb, Transfer::Gamma),
-            ..ExpandOptions::default()
-        });
-        let settings = Settings::new(width, height, expand.as_ref());
+        let (expand, network) = self.expand.expander()?;
+        let settings = Settings::new(width, height, expand.as_ref(), network);
         let config =
             PrepareConfig { grid: Equirect::new(width, height), expand, read: ReadOptions::default() };
         let found = scan::scan(&self.inputs, &self.output)?;
@@ -128,7 +120,8 @@ impl Prepare {
         let mut store = Store::open(&self.output, &settings, self.force.force, self.shard)?;
         let sources = self.shard.own(&found.sources);
         self.shard.note_idle(found.sources.len(), report);
-        work::examine_all(&mut store, &sources, &config, report)?;
+        work::examine_all(&mut store, &sources, &config, settings.network.as_ref(), report)?;
+        expand::warn(&store, settings.network.as_ref(), report);
         if self.shard.is_part() {
             report.note(format_args!(
                 "shard {}: {} of {} files examined; when all shards are done, the same command without --shard places the \
@@ -151,9 +144,4 @@ impl Prepare {
 fn share(text: &str) -> Result<f64, String> {
     let share = text.parse().ok().filter(|s| (0.0..1.0).contains(s));
     share.ok_or_else(|| format!("'{text}' is no share: give a number from 0 to below 1, like 0.1"))
-}
-
-fn gamma(text: &str) -> Result<f32, String> {
-    let gamma = text.parse().ok().filter(|g| (0.5..=4.0).contains(g));
-    gamma.ok_or_else(|| format!("'{text}' is no gamma: give a number from 0.5 to 4, like 2.2"))
 }

@@ -1,8 +1,10 @@
 //! One file: read, expanded if it must be, checked, resampled.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::Fingerprint;
+use crate::panorama::expand::network::{Estimate, Network, NetworkOptions};
 use crate::panorama::expand::{ExpandOptions, Sun};
 use crate::panorama::tonemap::quantile;
 use crate::panorama::{LdrPanorama, Panorama, ReadOptions, Sanitised, luminance};
@@ -19,14 +21,34 @@ const TRANSPARENT: f64 = 0.01;
 const CONSTANT: f32 = 1.01;
 
 /// What is asked of a panorama.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct PrepareConfig {
     /// The size it is brought to; it must be at least as large.
     pub grid: Equirect,
     /// How LDR panoramas are expanded; without, they are refused.
-    pub expand: Option<ExpandOptions>,
+    pub expand: Option<Expander>,
     /// Limits of what is read.
     pub read: ReadOptions,
+}
+
+/// What makes radiance from the values of LDR panoramas.
+#[derive(Clone, Debug)]
+pub enum Expander {
+    /// The fitted functions of [`panorama::expand`](crate::panorama::expand).
+    Fitted(ExpandOptions),
+    /// A network.
+    Network(Arc<dyn Network>, NetworkOptions),
+}
+
+/// How an LDR panorama was expanded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expansion {
+    /// Share of the sphere that was clipped in at least one channel, 0 to 1.
+    pub clipped: f64,
+    /// The sun that was added, if any; networks add none.
+    pub sun: Option<Sun>,
+    /// How the network did, if one was run.
+    pub estimate: Option<Estimate>,
 }
 
 /// A panorama that is fit for training.
@@ -42,8 +64,8 @@ pub struct Examined {
     pub replaced: Sanitised,
     /// Stops from the median luminance to the brightest, at the file's size.
     pub stops: f32,
-    /// For LDR files: share of the sphere that was clipped, and the sun that was added.
-    pub expanded: Option<(f64, Option<Sun>)>,
+    /// What was done to an LDR file.
+    pub expanded: Option<Expansion>,
 }
 
 /// Reads, checks and resamples a panorama: OpenEXR, Radiance, or an LDR format that is expanded.
@@ -51,7 +73,8 @@ pub struct Examined {
 /// # Errors
 /// Why the file is not fit: those of [`Panorama::read_with`] and [`LdrPanorama::read_with`]; [`Error::Invalid`]
 /// if it is smaller than asked, more than half black, has more than 5 % pixels that are not numbers or more than 1 %
-/// transparent ones, or one value throughout; [`Error::Unsupported`] for LDR files without `expand`.
+/// transparent ones, or one value throughout; [`Error::Unsupported`] for LDR files without `expand`; those of
+/// [`LdrPanorama::expand_by`].
 pub fn examine(path: &Path, config: &PrepareConfig) -> Result<Examined> {
     let (mut panorama, expanded) = read(path, config)?;
     let mut examined = || -> Result<Examined> {
@@ -84,13 +107,11 @@ pub fn examine(path: &Path, config: &PrepareConfig) -> Result<Examined> {
     examined().map_err(|e| e.in_file(path))
 }
 
-type Expansion = Option<(f64, Option<Sun>)>;
-
-fn read(path: &Path, config: &PrepareConfig) -> Result<(Panorama, Expansion)> {
+fn read(path: &Path, config: &PrepareConfig) -> Result<(Panorama, Option<Expansion>)> {
     if !LdrPanorama::recognise(path)? {
         return Ok((Panorama::read_with(path, &config.read)?, None));
     }
-    let Some(options) = &config.expand else {
+    let Some(expander) = &config.expand else {
         return Err(
             Error::unsupported("holds no high dynamic range, and expansion is switched off").in_file(path)
         );
@@ -101,8 +122,24 @@ fn read(path: &Path, config: &PrepareConfig) -> Result<(Panorama, Expansion)> {
         return Err(Error::invalid(format!("{percent:.0} % of it are transparent: fill the holes first"))
             .in_file(path));
     }
-    let expanded = ldr.expand(options);
-    Ok((expanded.panorama, Some((expanded.clipped, expanded.sun))))
+    let (panorama, expansion) = expander.expand(&ldr).map_err(|e| e.in_file(path))?;
+    Ok((panorama, Some(expansion)))
+}
+
+impl Expander {
+    fn expand(&self, ldr: &LdrPanorama) -> Result<(Panorama, Expansion)> {
+        match self {
+            Self::Fitted(options) => {
+                let done = ldr.expand(options);
+                Ok((done.panorama, Expansion { clipped: done.clipped, sun: done.sun, estimate: None }))
+            }
+            Self::Network(network, options) => {
+                let done = ldr.expand_by(network.as_ref(), options)?;
+                let expansion = Expansion { clipped: done.clipped, sun: None, estimate: done.estimate };
+                Ok((done.panorama, expansion))
+            }
+        }
+    }
 }
 
 /// Refuses what [`Panorama::sanitise`] would paint over, but only by inventing too much.

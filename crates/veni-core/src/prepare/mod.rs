@@ -20,7 +20,7 @@ mod tests;
 
 pub use capture::capture;
 pub use content::content_hash;
-pub use examine::{Examined, PrepareConfig, examine};
+pub use examine::{Examined, Expander, Expansion, PrepareConfig, examine};
 pub use fingerprint::{Fingerprint, Likeness};
 pub use group::{Bond, Groups, Member, group};
 pub use split::{Shares, Split, assign};

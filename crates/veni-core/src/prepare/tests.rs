@@ -95,7 +95,7 @@ fn what_is_unfit_is_refused_and_says_why() {
     let folder = tempfile::tempdir().unwrap();
     let config = PrepareConfig {
         grid: Equirect::new(32, 16),
-        expand: Some(ExpandOptions::default()),
+        expand: Some(Expander::Fitted(ExpandOptions::default())),
         read: ReadOptions::default(),
     };
     let good = panoramas().swap_remove(0);

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use veni_core::panorama::Sanitised;
-use veni_core::panorama::expand::Sun;
+use veni_core::panorama::expand::network::Estimate;
 use veni_core::prepare::{Examined, Fingerprint, Split, capture};
 
+use super::expand::NetworkSettings;
 use super::scan::Source;
 
 /// One examined file.
@@ -55,12 +56,26 @@ pub(super) struct Replaced {
 }
 
 /// What was rebuilt of an LDR panorama.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Expansion {
     /// Share of the sphere that was clipped.
     pub(super) clipped: f64,
     pub(super) sun_direction: Option<[f32; 3]>,
     pub(super) sun_energy: Option<f64>,
+    /// The network that did it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) network: Option<ByNetwork>,
+}
+
+/// What a network did.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct ByNetwork {
+    pub(super) model: String,
+    pub(super) sha256: String,
+    /// What its radiance was multiplied by.
+    pub(super) factor: f32,
+    /// Share of the clipped values for which it gave less than is stored.
+    pub(super) below: f64,
 }
 
 impl Record {
@@ -92,12 +107,19 @@ impl Record {
 }
 
 impl Facts {
-    pub(super) fn new(id: String, examined: &Examined) -> Self {
+    pub(super) fn new(id: String, examined: &Examined, network: Option<&NetworkSettings>) -> Self {
         let Sanitised { nan, infinite, not_positive } = examined.replaced;
-        let expansion = |(clipped, sun): (f64, Option<Sun>)| Expansion {
-            clipped,
-            sun_direction: sun.map(|s| s.direction),
-            sun_energy: sun.map(|s| s.energy),
+        let by = |(estimate, network): (Estimate, &NetworkSettings)| ByNetwork {
+            model: network.model.clone(),
+            sha256: network.sha256.clone(),
+            factor: estimate.factor,
+            below: estimate.below,
+        };
+        let expansion = |done: veni_core::prepare::Expansion| Expansion {
+            clipped: done.clipped,
+            sun_direction: done.sun.map(|s| s.direction),
+            sun_energy: done.sun.map(|s| s.energy),
+            network: done.estimate.zip(network).map(by),
         };
         Self {
             id,

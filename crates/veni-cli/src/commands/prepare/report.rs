@@ -121,7 +121,8 @@ fn markdown(
     ignored: &[String],
 ) -> Result<String, std::fmt::Error> {
     let mut out = String::new();
-    let Settings { width, height, expand, .. } = settings;
+    let Settings { width, height, .. } = settings;
+    let expand = settings.expansion();
     writeln!(out, "# Prepared panoramas\n")?;
     writeln!(
         out,
@@ -201,7 +202,16 @@ fn section(out: &mut String, title: &str, lines: impl Iterator<Item = String>) -
 }
 
 fn expanded(record: &Record, file: &str) -> Option<String> {
-    let expanded = record.facts()?.expanded?;
+    let expanded = record.facts()?.expanded.as_ref()?;
+    if let Some(network) = &expanded.network {
+        return Some(format!(
+            "{file}: {:.1} % clipped, by {}, times {:.4}, {:.1} % of the clipped values darker than stored",
+            100.0 * expanded.clipped,
+            network.model,
+            network.factor,
+            100.0 * network.below
+        ));
+    }
     let sun = match expanded.sun_direction {
         Some([.., z]) => format!("a sun {:.0}° above the horizon", z.asin().to_degrees()),
         None => "no sun".to_owned(),

@@ -18,8 +18,9 @@ use serde::{Deserialize, Serialize};
 use veni_core::Error;
 use veni_core::output::{Overwrite, write_atomic};
 use veni_core::panorama::Transfer;
-use veni_core::panorama::expand::ExpandOptions;
+use veni_core::prepare::Expander;
 
+use super::expand::NetworkSettings;
 use super::record::Record;
 use super::scan::Source;
 use crate::output::{PROBE, writable};
@@ -36,6 +37,9 @@ pub(super) struct Settings {
     pub(super) height: usize,
     /// "off", "srgb", or the gamma.
     pub(super) expand: String,
+    /// What expands instead of the fitted functions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) network: Option<NetworkSettings>,
 }
 
 /// The folder that is filled.
@@ -50,13 +54,30 @@ pub(super) struct Store {
 }
 
 impl Settings {
-    pub(super) fn new(width: usize, height: usize, expand: Option<&ExpandOptions>) -> Self {
-        let expand = match expand.map(|e| e.transfer) {
+    pub(super) fn new(
+        width: usize,
+        height: usize,
+        expand: Option<&Expander>,
+        network: Option<NetworkSettings>,
+    ) -> Self {
+        let transfer = expand.map(|e| match e {
+            Expander::Fitted(options) => options.transfer,
+            Expander::Network(_, options) => options.transfer,
+        });
+        let expand = match transfer {
             None => "off".to_owned(),
             Some(Transfer::Gamma(gamma)) => format!("gamma {gamma}"),
             Some(_) => "srgb".to_owned(),
         };
-        Self { format: FORMAT, width, height, expand }
+        Self { format: FORMAT, width, height, expand, network }
+    }
+
+    /// How LDR images are expanded, in words.
+    pub(super) fn expansion(&self) -> String {
+        match &self.network {
+            Some(network) => format!("{} by {network}", self.expand),
+            None => self.expand.clone(),
+        }
     }
 }
 
@@ -103,7 +124,7 @@ impl Store {
                         root.display(),
                         old.width,
                         old.height,
-                        old.expand
+                        old.expansion()
                     );
                 }
             }

@@ -9,6 +9,7 @@ use veni_core::output::Overwrite;
 use veni_core::panorama::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions};
 use veni_core::prepare::{Examined, PrepareConfig, content_hash, examine};
 
+use super::expand::NetworkSettings;
 use super::record::{Facts, Fate, Record};
 use super::scan::Source;
 use super::store::Store;
@@ -28,6 +29,7 @@ pub(super) fn examine_all(
     store: &mut Store,
     sources: &[Source],
     config: &PrepareConfig,
+    network: Option<&NetworkSettings>,
     report: Report,
 ) -> Result<()> {
     let todo: Vec<&Source> = sources.iter().filter(|s| !store.is_done(s)).collect();
@@ -39,7 +41,7 @@ pub(super) fn examine_all(
     let done = AtomicU64::new(skipped as u64);
     let store = Mutex::new(store);
     let one = |source: &&Source| -> Result<()> {
-        let fate = fate(&store, source, config)?;
+        let fate = fate(&store, source, config, network)?;
         if let Fate::Refused(reason) = &fate {
             to_stderr(&format!("{}: {reason}\n", source.path.display()));
         }
@@ -60,7 +62,12 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 }
 
 /// What becomes of one file; an error is about the output, or the system.
-fn fate(store: &Mutex<&mut Store>, source: &Source, config: &PrepareConfig) -> Result<Fate> {
+fn fate(
+    store: &Mutex<&mut Store>,
+    source: &Source,
+    config: &PrepareConfig,
+    network: Option<&NetworkSettings>,
+) -> Result<Fate> {
     let refused = |error: veni_core::Error| {
         let text = error.to_string();
         let prefix = format!("{}: ", source.path.display());
@@ -81,7 +88,7 @@ fn fate(store: &Mutex<&mut Store>, source: &Source, config: &PrepareConfig) -> R
         ..WriteOptions::new(WriteFormat::Exr(Precision::Half))
     };
     examined.panorama.write(&path, &options).map_err(with_remedy)?;
-    Ok(Fate::Fit(Box::new(Facts::new(id, &examined))))
+    Ok(Fate::Fit(Box::new(Facts::new(id, &examined, network))))
 }
 
 /// Half precision holds values from 6e-5 to 65,504 with full precision; panoramas in other units are scaled by a power of
