@@ -339,3 +339,21 @@ fn pretraining_and_finetuning_are_one_command() {
     let reni = [&reni[..], &["--system", "reni++", "--pretrain", &first]].concat();
     dir.refused(&reni, &["--pretrain", "--init"]);
 }
+
+#[test]
+fn generated_scenes_are_drawn_as_often_as_asked_and_are_no_part_of_the_prior() {
+    let dir = Dir::new();
+    let data = text(panoramas());
+    let scenes = ["--synthetic", "3", "--set", "data.synthetic_share=0.5"];
+    dir.ok(&[&train_args(&data, "run", "1")[..], &scenes].concat());
+    let model = &dir.json(&["inspect", "run/model.safetensors"])[0];
+    let said = "8 panoramas of panoramas and 3 generated scenes (50 % of the draws)";
+    assert_eq!(model["training"]["data"], said);
+    // each of the eight and one augmented copy
+    assert_eq!(model["prior"]["description"], "16 training latents");
+    let refused = ["--set", "data.synthetic_share=0.5"];
+    dir.refused(
+        &[&train_args(&data, "other", "1")[..], &refused].concat(),
+        &["synthetic_share", "generated"],
+    );
+}

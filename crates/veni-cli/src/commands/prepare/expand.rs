@@ -19,6 +19,9 @@ use super::store::Store;
 use crate::report::Report;
 use crate::size::Size;
 
+/// Under which the options of a network stand in `--help`.
+const NETWORK: &str = "Expansion by a network of your own";
+
 #[derive(Args, Debug)]
 pub(super) struct Expand {
     /// What becomes of images with a display's range
@@ -30,46 +33,23 @@ pub(super) struct Expand {
     gamma: Option<f32>,
 
     /// Rebuild what is clipped by this network (build with --features onnx)
-    #[arg(long, value_name = "MODEL.onnx", help_heading = "Expansion by a network of your own")]
+    #[arg(long, value_name = "MODEL.onnx", help_heading = NETWORK)]
     expand_with: Option<PathBuf>,
 
     /// What it is given, in [0, 1]
-    #[arg(
-        long,
-        value_enum,
-        default_value_t,
-        requires = "expand_with",
-        help_heading = "Expansion by a network of your own"
-    )]
+    #[arg(long, value_enum, default_value_t, requires = "expand_with", help_heading = NETWORK)]
     expand_input: Input,
 
     /// What it gives
-    #[arg(
-        long,
-        value_enum,
-        default_value_t,
-        requires = "expand_with",
-        help_heading = "Expansion by a network of your own"
-    )]
+    #[arg(long, value_enum, default_value_t, requires = "expand_with", help_heading = NETWORK)]
     expand_output: Output,
 
     /// The unit of that
-    #[arg(
-        long,
-        value_enum,
-        default_value_t,
-        requires = "expand_with",
-        help_heading = "Expansion by a network of your own"
-    )]
+    #[arg(long, value_enum, default_value_t, requires = "expand_with", help_heading = NETWORK)]
     expand_scale: Scale,
 
     /// The size at which it sees them, if it takes any [default: the image's own, at most 1024x512]
-    #[arg(
-        long,
-        value_name = "W|WxH",
-        requires = "expand_with",
-        help_heading = "Expansion by a network of your own"
-    )]
+    #[arg(long, value_name = "W|WxH", requires = "expand_with", help_heading = NETWORK)]
     expand_size: Option<Size>,
 }
 
