@@ -73,6 +73,8 @@ fn every_preset_and_objective_runs_and_seeds_name_starts() {
     for objective in ["log", "absolute", "display", "reference", "cosine-scale", "training"] {
         loss(&["--objective", objective]);
     }
+    let by = |method: &str| loss(&["--method", method]);
+    assert!(by("auto") == by("levenberg-marquardt") && by("auto") != by("adam"));
     let noise = |seed: &str| loss(&["--start", "noise", "--seed", seed]);
     assert_eq!(noise("1"), noise("1"));
     assert!(noise("1") != noise("2"));
@@ -202,6 +204,12 @@ fn what_cannot_be_fitted_is_refused_before_any_work() {
     refused(&[&sky, "-o", "a.json", "--completed", "c.exr", "--size", "8x8"], &["--size 8x8"]);
     refused(&[&sky, "--prior=-1"], &["prior = -1"]);
     refused(&[&sky, "--resolution", "32x32"], &["--resolution"]);
+    let marquardt = ["--method", "levenberg-marquardt"];
+    refused(&[&[sky.as_str(), "--rate", "0.1"][..], &marquardt].concat(), &["--rate", "adam"]);
+    refused(
+        &[&[sky.as_str(), "--objective", "cosine-scale"][..], &marquardt].concat(),
+        &["levenberg-marquardt", "adam"],
+    );
     mistyped(&dir, &[&sky, "--rate", "0"], "learning rate");
 }
 

@@ -3,6 +3,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use veni_core::field::Curved;
 use veni_core::latent::{Latent, Prior};
 use veni_core::model::{Model, ModelConfig};
 use veni_core::sphere::Equirect;
@@ -31,6 +32,10 @@ fn field(c: &mut Criterion) {
         let square = |_, p: [f32; 3]| (0.0, p);
         group.bench_function("gradient 128x64", |b| {
             b.iter_with_large_drop(|| black_box(&field).gradient(&directions, square));
+        });
+        let curved = |_, p: [f32; 3]| Curved { loss: 0.0, slope: p, curvature: [1.0; 3] };
+        group.bench_function("normal equations 128x64", |b| {
+            b.iter_with_large_drop(|| black_box(&field).normal_equations(&directions, curved));
         });
         group.finish();
     }

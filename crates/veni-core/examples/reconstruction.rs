@@ -12,7 +12,7 @@ use image::{Rgb, RgbImage};
 use veni_core::data::{Dataset, Item, panorama_files};
 use veni_core::eval::metrics::Alignment;
 use veni_core::eval::reconstruction::{Reconstruction, Start};
-use veni_core::fit::FitConfig;
+use veni_core::fit::{FitConfig, FitDecoder};
 use veni_core::latent::Latent;
 use veni_core::model::Model;
 use veni_core::output::{Overwrite, write_atomic};
@@ -34,10 +34,10 @@ fn main() -> Result<()> {
     let set = Dataset::load(&panorama_files(Path::new(folder))?, Equirect::new(128, 64))?;
 
     let pass = Reconstruction::autoencoder(&veni, &set, Alignment::Exposure)?;
-    // a fit needs gradients in the latent
-    let tracked = Veni::from_model(&model, &Device::flex().autodiff())?;
+    let decoder = model.decoder()?;
     let best = Reconstruction::optimised(
-        &tracked,
+        &veni,
+        FitDecoder::from(&decoder),
         &set,
         Start::Encoder,
         &FitConfig::thorough(),

@@ -23,6 +23,8 @@ pub mod synth;
 #[cfg(feature = "learn")]
 pub mod baseline;
 #[cfg(feature = "learn")]
+mod cholesky;
+#[cfg(feature = "learn")]
 pub mod data;
 #[cfg(feature = "learn")]
 pub mod eval;

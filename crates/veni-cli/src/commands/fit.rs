@@ -114,7 +114,7 @@ impl Fit {
         let outputs = output::one_per_input(pictures, output, folder, "json", overwrite, self.shard)?;
         self.shard.note_idle(pictures.len(), report);
         self.settings.grid(false)?;
-        let config = self.settings.config()?;
+        let config = self.settings.config(self.shaded.normals.is_some())?;
         let loaded = source::model(&self.model)?;
         let device = DeviceKind::Flex.device()?;
         let subject =
@@ -209,7 +209,8 @@ impl Fit {
         let starts = self.starts(path, &observation, subject)?;
         self.check_starts(starts.len())?;
         let config = self.settings.adapted(*config, partial);
-        let (total, prior) = (config.steps * starts.len() as u64, subject.prior());
+        let (total, prior) =
+            (config.most_updates(subject.latent_vectors()) * starts.len() as u64, subject.prior());
         let mut progress = Progress::start(report, "step", 0, total);
         let best = observation.with_target(|target| {
             let target = FitTarget { prior: Some(&prior), ..target.clone() };

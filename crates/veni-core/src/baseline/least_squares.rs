@@ -1,8 +1,7 @@
 //! Linear least squares by normal equations: G x = b with the Gram matrix G = Σ ω f fᵀ of the basis functions
 //! f on the pixels that there are. Nothing is assumed to be orthonormal.
 
-/// A pivot below this share of its diagonal element says that the columns are dependent.
-const RANK: f64 = 1e-10;
+use crate::cholesky;
 
 /// Coefficients x `[columns][3]` that minimise Σ_p ω_p |Σ_k f_pk x_k − t_p|² + ridge·|x|², for a `basis`
 /// `[pixels, columns]`. `None` if the pixels do not determine them.
@@ -27,40 +26,9 @@ pub(super) fn solve(
         }
     }
     (0..columns).for_each(|i| gram[i * columns + i] += ridge);
-    cholesky(&mut gram, columns)?;
-    substitute(&gram, columns, &mut right);
+    cholesky::factor(&mut gram, columns)?;
+    cholesky::substitute(&gram, columns, &mut right);
     Some(right)
-}
-
-/// G = R Rᵀ in place, R lower triangular; only the lower triangle is read and written.
-fn cholesky(gram: &mut [f64], n: usize) -> Option<()> {
-    for i in 0..n {
-        let (above, row) = gram.split_at_mut(i * n);
-        for j in 0..i {
-            let other = &above[j * n..][..=j];
-            let dot: f64 = row[..j].iter().zip(other).map(|(a, b)| a * b).sum();
-            row[j] = (row[j] - dot) / other[j];
-        }
-        let pivot = row[i] - row[..i].iter().map(|v| v * v).sum::<f64>();
-        if pivot.is_nan() || pivot <= RANK * row[i] {
-            return None;
-        }
-        row[i] = pivot.sqrt();
-    }
-    Some(())
-}
-
-/// R Rᵀ x = b in place.
-fn substitute(factor: &[f64], n: usize, x: &mut [[f64; 3]]) {
-    let less = |a: [f64; 3], k: f64, b: [f64; 3]| [0, 1, 2].map(|c| a[c] - k * b[c]);
-    for i in 0..n {
-        let rest = (0..i).fold(x[i], |rest, j| less(rest, factor[i * n + j], x[j]));
-        x[i] = rest.map(|v| v / factor[i * n + i]);
-    }
-    for i in (0..n).rev() {
-        let rest = (i + 1..n).fold(x[i], |rest, j| less(rest, factor[j * n + i], x[j]));
-        x[i] = rest.map(|v| v / factor[i * n + i]);
-    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::subject::Subject;
 use crate::Result;
 use crate::data::coarsen::{averaged, coarse_grid};
-use crate::fit::{self, FitConfig, FitResult, FitTarget};
+use crate::fit::{self, FitConfig, FitResult, FitTarget, Method};
 use crate::latent::Latent;
 use crate::sphere::Equirect;
 
@@ -19,7 +19,7 @@ pub struct FitSettings {
 }
 
 impl FitSettings {
-    /// Solid-angle-weighted log error, 400 steps on a quarter of the pixels; `quick`: 100 steps on a sixteenth.
+    /// [`FitConfig::thorough`] on a quarter of the pixels; `quick`: at most 100 steps on a sixteenth.
     pub fn thorough(grid: Equirect, quick: bool) -> Self {
         let config = FitConfig::thorough();
         let config = if quick { config.in_steps(100) } else { config };
@@ -46,7 +46,15 @@ impl FitSettings {
             1 => "every pixel".to_owned(),
             n => format!("means over {n} × {n} pixels"),
         };
-        format!("{} Adam steps on {every}", self.config.steps)
+        let steps = self.config.steps;
+        match self.config.method {
+            Method::Adam => format!("{steps} Adam steps on {every}"),
+            Method::LevenbergMarquardt => format!("Levenberg–Marquardt to the end on {every}"),
+            Method::Auto => format!(
+                "Levenberg–Marquardt to the end, with more than 16 vectors after {steps} exploring Adam steps (where it \
+                 does not apply: those alone), on {every}"
+            ),
+        }
     }
 
     /// Fits one latent to each image (log radiance at exposure 0 on `grid`).

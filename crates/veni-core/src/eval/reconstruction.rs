@@ -6,7 +6,7 @@ use crate::Result;
 use crate::data::Dataset;
 use crate::data::coarsen::{averaged, coarse_grid};
 use crate::eval::metrics::{self, Alignment};
-use crate::fit::{FitConfig, FitTarget, fit};
+use crate::fit::{FitConfig, FitDecoder, FitTarget, fit};
 use crate::latent::Latent;
 use crate::vae::Veni;
 
@@ -73,8 +73,8 @@ impl Reconstruction {
         Ok(Self::of_latents(veni, dataset, &latents, alignment))
     }
 
-    /// The best the decoder can do: each panorama decoded from a latent optimised for it. The fit sees the
-    /// panoramas averaged over `factor` × `factor` pixels (1: every pixel); the scores see every pixel.
+    /// The best the decoder can do: each panorama decoded from a latent optimised for it under `decoder`, the model's own
+    /// in either form. The fit sees the panoramas averaged over `factor` × `factor` pixels (1: every pixel); the scores see every pixel.
     ///
     /// # Errors
     /// As [`Veni::stripes`] and [`fit`].
@@ -83,6 +83,7 @@ impl Reconstruction {
     /// If `factor` does not divide the grid's sides.
     pub fn optimised(
         veni: &Veni,
+        decoder: FitDecoder<'_>,
         dataset: &Dataset,
         start: Start,
         config: &FitConfig,
@@ -101,7 +102,7 @@ impl Reconstruction {
                 items.iter().map(|i| averaged(dataset.grid(), &i.log_radiance, factor)).collect();
             let images: Vec<_> = images.iter().map(Vec::as_slice).collect();
             let target = FitTarget::panoramas(grid, &images);
-            latents.extend(fit(&veni.decoder, &target, start, config)?.latents);
+            latents.extend(fit(decoder, &target, start, config)?.latents);
         }
         Ok(Self::of_latents(veni, dataset, &latents, alignment))
     }

@@ -32,8 +32,8 @@ impl Matrix {
         Self { inputs, data }
     }
 
-    /// Of a row-major matrix.
-    fn new(data: &[f32], outputs: usize) -> Self {
+    /// Of a row-major matrix [in, out].
+    pub(super) fn new(data: &[f32], outputs: usize) -> Self {
         Self::pack(data.len() / outputs, outputs, |k| &data[k * outputs..][..outputs])
     }
 

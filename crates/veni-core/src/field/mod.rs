@@ -29,7 +29,7 @@ use crate::model::Model;
 use crate::{Error, Result};
 use weights::Weights;
 
-pub use gradient::Gradient;
+pub use gradient::{Curved, Gradient, NormalEquations};
 pub use rate::multiply_add_rate;
 
 /// Largest |z_x|, |z_y| of a latent. Beyond it f32 does not resolve the phase of the encoding; trained codes

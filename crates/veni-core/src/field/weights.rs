@@ -1,5 +1,8 @@
 //! A decoder's weights in the order that conditioning and kernels read them. Packed once per model.
 
+use std::sync::OnceLock;
+
+use super::gradient::Joint;
 use super::mlp::{Mlp, PANEL};
 use crate::model::{Model, VnReluForm};
 
@@ -39,6 +42,8 @@ pub(super) struct Weights {
     pub(super) attention: Vec<Attention>,
     pub(super) input_bias: Vec<f32>,
     pub(super) mlp: Mlp,
+    /// Made when the first normal equations are asked for.
+    joint: OnceLock<Vec<Joint>>,
 }
 
 impl Weights {
@@ -64,7 +69,13 @@ impl Weights {
             attention: (0..config.decoder.layers).map(attention).collect(),
             input_bias,
             mlp: Mlp::new(config.decoder.hidden, config.decoder.layers, tensor),
+            joint: OnceLock::new(),
         }
+    }
+
+    /// The two linear maps of every layer's attention in one.
+    pub(super) fn joint(&self) -> &[Joint] {
+        self.joint.get_or_init(|| self.attention.iter().map(|a| Joint::new(&a.value, &a.out)).collect())
     }
 }
 

@@ -10,9 +10,12 @@ use crate::{Error, Result};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitConfig {
-    /// Adam updates, at most.
+    /// Updates, at most; see [`Method`] for what follows them.
     pub steps: u64,
-    /// Learning rate over the updates, from step 0.
+    /// How the loss is lowered.
+    #[serde(default, skip_serializing_if = "Method::is_adam")]
+    pub method: Method,
+    /// Learning rate of Adam over the updates, from step 0.
     pub learning_rate: LearningRate,
     /// Adam's ε. The authors' 1e-15 makes every coordinate move by the full rate at first.
     pub epsilon: f64,
@@ -23,12 +26,41 @@ pub struct FitConfig {
     pub prior: f64,
     /// Whether each latent's log exposure is optimised too.
     pub free_exposure: bool,
-    /// When to stop before `steps`; absent: never.
+    /// When Adam stops before `steps`; absent: never.
     #[serde(default)]
     pub plateau: Option<Plateau>,
 }
 
-/// Stops a fit that no longer gets better.
+/// How the loss is lowered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Adam with β = (0.9, 0.999): the authors'. For every decoder and objective.
+    #[default]
+    Adam,
+    /// Gauss–Newton steps with a damping that adapts itself: no learning rate, and it ends by itself where the loss no
+    /// longer falls, at the minimum next to the start. For folded decoders
+    /// ([`FitDecoder::Folded`](super::FitDecoder::Folded)) and objectives that look at each pixel alone.
+    LevenbergMarquardt,
+    /// Levenberg–Marquardt where it applies, else Adam. With more than 16 latent vectors the loss has so many minima that
+    /// the one next to the start is seldom a good one: there Adam explores for all the updates, and
+    /// Levenberg–Marquardt goes to the end from where it stops, in 60 more at most.
+    Auto,
+}
+
+/// Most latent vectors that [`Method::Auto`] fits without exploring.
+const FEW: usize = 16;
+/// Updates of Levenberg–Marquardt after exploring.
+const POLISH: u64 = 60;
+
+impl Method {
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+    fn is_adam(&self) -> bool {
+        *self == Self::Adam
+    }
+}
+
+/// Stops a fit by Adam that no longer gets better.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plateau {
@@ -73,10 +105,11 @@ impl FitConfig {
     pub fn thorough() -> Self {
         Self {
             steps: 400,
-            learning_rate: exponential(5e-2, 2e-3, 400),
+            method: Method::Auto,
+            learning_rate: exponential(2e-1, 2e-3, 400),
             epsilon: 1e-8,
             objective: Objective::LogError,
-            prior: 1e-3,
+            prior: 1e-4,
             free_exposure: false,
             plateau: None,
         }
@@ -84,13 +117,19 @@ impl FitConfig {
 
     /// As [`FitConfig::thorough`], for what a screen shows under the image's own white.
     pub fn display() -> Self {
-        Self { objective: Objective::Display { log: 0.01 }, prior: 1e-4, ..Self::thorough() }
+        Self { objective: Objective::Display { log: 0.01 }, ..Self::thorough() }
+    }
+
+    /// For the light on a surface ([`fit_shaded`](super::fit_shaded)), whose loss is no sum over the light's pixels.
+    pub fn light() -> Self {
+        Self { method: Method::Adam, learning_rate: exponential(5e-2, 2e-3, 400), ..Self::thorough() }
     }
 
     /// The authors' helper (figures, uniqueness): `steps` steps from `rate` to `last`.
     pub fn reference_helper(rate: f64, last: f64, steps: u64) -> Self {
         Self {
             steps,
+            method: Method::Adam,
             learning_rate: exponential(rate, last, steps),
             epsilon: 1e-15,
             objective: Objective::ReferenceLogError,
@@ -104,6 +143,7 @@ impl FitConfig {
     pub fn reni_evaluation() -> Self {
         Self {
             steps: 2500,
+            method: Method::Adam,
             learning_rate: exponential(1e-1, 1e-7, 2500),
             epsilon: 1e-15,
             objective: Objective::CosineScaleInvariant,
@@ -126,6 +166,22 @@ impl FitConfig {
             _ => {}
         }
         Self { steps, learning_rate, ..self }
+    }
+
+    /// Updates of Adam and then of Levenberg–Marquardt, at most, for latents of `vectors` vectors; `applies` says whether
+    /// the latter applies.
+    pub(super) fn plan(&self, vectors: usize, applies: bool) -> [u64; 2] {
+        match self.method {
+            Method::Auto if applies && vectors > FEW => [self.steps, POLISH],
+            Method::Auto if !applies => [self.steps, 0],
+            Method::Adam => [self.steps, 0],
+            Method::LevenbergMarquardt | Method::Auto => [0, self.steps],
+        }
+    }
+
+    /// Updates for latents of `vectors` vectors, at most.
+    pub fn most_updates(&self, vectors: usize) -> u64 {
+        self.plan(vectors, true).iter().sum()
     }
 
     /// Checks what types cannot.

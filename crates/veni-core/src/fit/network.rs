@@ -5,7 +5,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 
 use super::pixel::PixelLoss;
 use super::whole::WholeLoss;
-use crate::field;
+use crate::field::{self, Curved, NormalEquations};
 use crate::latent::Latent;
 use crate::shade::ShadedImage;
 use crate::vae;
@@ -99,6 +99,11 @@ impl<'a> Network<'a> {
         }
     }
 
+    /// Whether the decoder is folded.
+    pub(super) fn is_folded(&self) -> bool {
+        matches!(self, Self::Folded { .. })
+    }
+
     /// The losses and their slopes at `latents`.
     pub(super) fn evaluate(&self, latents: &[Latent], loss: &ImageLoss<'_>) -> Result<Evaluation> {
         match self {
@@ -111,6 +116,19 @@ impl<'a> Network<'a> {
                 graph(&|z| decoder.forward(z, directions.clone()), device, latents, loss)
             }
         }
+    }
+
+    /// The normal equations of one image at its latent, for a decoder that [is folded](Network::is_folded).
+    pub(super) fn equations(&self, latent: &Latent, image: &PixelLoss<'_>) -> Result<NormalEquations> {
+        let Self::Folded { decoder, directions, .. } = self else {
+            return Err(Error::invalid("normal equations are those of a folded decoder"));
+        };
+        let at = |i: usize, p: [f32; 3]| {
+            let value = image.at(i, p.map(f64::from));
+            let [slope, curvature] = [value.slope, value.curvature].map(|v| v.map(|v| v as f32));
+            Curved { loss: value.loss, slope, curvature }
+        };
+        Ok(decoder.condition(latent)?.normal_equations(directions, at))
     }
 
     /// The loss of each image alone.
@@ -154,8 +172,8 @@ fn folded(
         ImageLoss::Pixels(images) => {
             let each = fields.iter().zip(images).map(|(field, image)| {
                 field.gradient(directions, |i, p| {
-                    let (value, slope) = image.at(i, p.map(f64::from));
-                    (value, slope.map(|s| s as f32))
+                    let value = image.at(i, p.map(f64::from));
+                    (value.loss, value.slope.map(|s| s as f32))
                 })
             });
             let gradients: Vec<_> = each.collect();
@@ -291,9 +309,9 @@ fn slopes(prediction: &[f64], images: &[PixelLoss<'_>]) -> (Vec<f64>, Vec<f64>) 
             .iter()
             .enumerate()
             .map(|(i, p)| {
-                let (value, slope) = image.at(i, *p);
-                slopes.extend(slope);
-                value
+                let value = image.at(i, *p);
+                slopes.extend(value.slope);
+                value.loss
             })
             .sum()
     });

@@ -7,6 +7,15 @@ use crate::panorama::tonemap;
 /// Where the absolute error turns from a parabola into a line, in log radiance.
 const ROUNDING: f64 = 0.1;
 
+/// A pixel's part of a loss around a prediction, channel by channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct PixelValue {
+    pub(super) loss: f64,
+    pub(super) slope: [f64; 3],
+    /// Of the parabola that stands for the loss where a squared error would be one: at least 0.
+    pub(super) curvature: [f64; 3],
+}
+
 /// One image's loss: a sum over pixels.
 #[derive(Debug)]
 pub(super) struct PixelLoss<'a> {
@@ -48,14 +57,14 @@ impl<'a> PixelLoss<'a> {
         Some(Self { objective, image, clipped: target.clipped.map(|c| c[b]), weights, white, shown })
     }
 
-    /// The pixel's part of the loss for log radiance `prediction`, and its derivatives.
-    pub(super) fn at(&self, pixel: usize, prediction: [f64; 3]) -> (f64, [f64; 3]) {
+    /// The pixel's part of the loss for log radiance `prediction`.
+    pub(super) fn at(&self, pixel: usize, prediction: [f64; 3]) -> PixelValue {
         // the mean over the channels
         let weight = self.weights[pixel] / 3.0;
+        let mut out = PixelValue::default();
         if weight == 0.0 {
-            return (0.0, [0.0; 3]);
+            return out;
         }
-        let (mut loss, mut slopes) = (0.0, [0.0; 3]);
         for c in 0..3 {
             let k = 3 * pixel + c;
             let (p, i) = (prediction[c], f64::from(self.image[k]));
@@ -63,22 +72,25 @@ impl<'a> PixelLoss<'a> {
             if error > 0.0 && self.clipped.is_some_and(|clipped| clipped[k]) {
                 continue;
             }
-            let (value, slope) = match self.objective {
+            let (value, slope, curvature) = match self.objective {
                 Objective::LogAbsolute => {
+                    // the parabola through the same value and slope that lies above it everywhere
                     let root = error.hypot(ROUNDING);
-                    (root - ROUNDING, error / root)
+                    (root - ROUNDING, error / root, 1.0 / root)
                 }
                 Objective::Display { log } => {
                     let (shown, by) = display(p - self.white);
                     let difference = shown - self.shown[k];
-                    (difference * difference + log * error * error, 2.0 * difference * by + 2.0 * log * error)
+                    let slope = 2.0 * difference * by + 2.0 * log * error;
+                    (difference * difference + log * error * error, slope, 2.0 * by * by + 2.0 * log)
                 }
-                _ => (error * error, 2.0 * error),
+                _ => (error * error, 2.0 * error, 2.0),
             };
-            loss += weight * value;
-            slopes[c] = weight * slope;
+            out.loss += weight * value;
+            out.slope[c] = weight * slope;
+            out.curvature[c] = weight * curvature;
         }
-        (loss, slopes)
+        out
     }
 }
 

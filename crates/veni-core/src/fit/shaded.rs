@@ -81,7 +81,7 @@ mod tests {
     fn the_true_light_is_a_perfect_fit_and_a_near_one_is_drawn_to_it() {
         let decoder = model(&decoder()).decoder().unwrap();
         let image = [ball(1, 0.4)];
-        let config = FitConfig { prior: 0.0, free_exposure: true, steps: 200, ..FitConfig::thorough() };
+        let config = FitConfig { prior: 0.0, free_exposure: true, steps: 200, ..FitConfig::light() };
         let truth = Latent { log_exposure: 0.4, ..latent(1) };
         let none = FitConfig { steps: 0, ..config };
         let exact =
@@ -113,7 +113,7 @@ mod tests {
         let fast = model(&graph).decoder().unwrap();
         let images = [ball(1, 0.0), ball(2, 0.3)];
         let start = [3, 4].map(latent);
-        let config = FitConfig { free_exposure: true, steps: 4, ..FitConfig::thorough() };
+        let config = FitConfig { free_exposure: true, steps: 4, ..FitConfig::light() };
         let a = fit_shaded(&fast, &images, None, &start, &config, &mut |_, _| {}).unwrap();
         let b = fit_shaded(&graph, &images, None, &start, &config, &mut |_, _| {}).unwrap();
         for (a, b) in a.losses.iter().chain(&a.last).zip(b.losses.iter().chain(&b.last)) {
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn images_of_other_lights_and_missing_starts_are_refused() {
         let decoder = model(&decoder()).decoder().unwrap();
-        let config = FitConfig::thorough();
+        let config = FitConfig::light();
         let refused = |images: &[ShadedImage], start: &[Latent]| {
             fit_shaded(&decoder, images, None, start, &config, &mut |_, _| {}).unwrap_err().to_string()
         };

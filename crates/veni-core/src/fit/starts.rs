@@ -75,7 +75,7 @@ fn from_each(
 ) -> Result<Best> {
     let (mut all, mut losses) = (Vec::new(), Vec::new());
     for (k, start) in starts.iter().enumerate() {
-        let before = k as u64 * config.steps;
+        let before = k as u64 * config.most_updates(start.vectors.len());
         let found = fit(std::slice::from_ref(start), &mut |step, loss| watch(before + step, loss))?;
         all.extend(found.latents);
         losses.extend(found.last);

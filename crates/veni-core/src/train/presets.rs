@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use toml::{Table, Value};
 
 use crate::data::{AugmentConfig, DataConfig};
-use crate::fit::FitConfig;
+use crate::fit::{FitConfig, Method};
 use crate::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 use crate::train::config::{
     DecoderBy, DeviceKind, GroupConfig, LossGrid, Order, ReportConfig, StageConfig, Stored, TrainConfig,
@@ -68,7 +68,13 @@ impl Preset {
             before: 0.0,
             ramp: Ramp::Cosine,
         };
-        let fit = FitConfig { steps: fit, learning_rate: falling(fit), ..FitConfig::thorough() };
+        let fit = FitConfig {
+            steps: fit,
+            method: Method::Adam,
+            learning_rate: falling(fit),
+            prior: 1e-3,
+            ..FitConfig::thorough()
+        };
         let off = WeightSchedule::Constant(0.0);
         let adam = AdamConfig { epsilon: 1e-15, clip: None, ..AdamConfig::default() };
         let group = || group(1e-3, [warm_up, steps], 0.05, adam);
@@ -166,8 +172,14 @@ fn group(rate: f64, [warm_up, steps]: [u64; 2], floor: f64, adam: AdamConfig) ->
     GroupConfig { learning_rate, adam }
 }
 
+/// Weight of the mean divergence per latent vector. Few vectors need the noise of the posterior to be kept apart; with many,
+/// noise in each is what keeps the decoder from telling panoramas apart that it has not seen.
+fn divergence_weight(latent_vectors: usize) -> f64 {
+    if latent_vectors > 16 { 0.001 } else { 0.02 }
+}
+
 fn small(latent_vectors: usize) -> TrainConfig {
-    let steps = 12_000;
+    let steps = 22_000;
     let adam = AdamConfig { weight_decay: 0.05, ..AdamConfig::default() };
     TrainConfig {
         seed: 0,
@@ -196,12 +208,11 @@ fn small(latent_vectors: usize) -> TrainConfig {
         augment: varied(),
         loss_grid: LossGrid::Strided { factor: 2 },
         // The gradient term is lighter than the paper's: 27 numbers cannot follow edges. What a viewer sees
-        // (clamped, tonemapped) is asked for directly, which covers most of the colour too. The divergence weighs
-        // double: overfitting is the enemy.
+        // (clamped, tonemapped) is asked for directly, which covers most of the colour too.
         loss: LossConfig {
             mage: WeightSchedule::Constant(0.1),
             cosine: WeightSchedule::Constant(0.1),
-            kld: WeightSchedule::Constant(0.02),
+            kld: WeightSchedule::Constant(divergence_weight(latent_vectors)),
             ldr_mse: WeightSchedule::Constant(15.0),
             ..LossConfig::default()
         },

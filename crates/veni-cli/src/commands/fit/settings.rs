@@ -1,8 +1,8 @@
 //! How it is fitted.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use veni_core::fit::{FitConfig, Objective, Plateau};
+use veni_core::fit::{FitConfig, Method, Objective, Plateau};
 use veni_core::sphere::Equirect;
 use veni_core::train::loss::LossConfig;
 use veni_core::train::schedule::LearningRate;
@@ -28,11 +28,15 @@ pub(super) struct Settings {
     #[arg(long, value_enum)]
     objective: Option<ObjectiveName>,
 
+    /// How the loss is lowered [default: the preset's; adam where --rate is given]
+    #[arg(long, value_enum)]
+    method: Option<MethodName>,
+
     /// Updates per start, at most [default: the preset's]
     #[arg(long, value_name = "K")]
     steps: Option<u64>,
 
-    /// Learning rate, or first and last of an exponential decay [default: the preset's]
+    /// Learning rate of adam, or first and last of an exponential decay [default: the preset's]
     #[arg(long, value_name = "RATE[:LAST]", value_parser = rate)]
     rate: Option<(f64, Option<f64>)>,
 
@@ -69,7 +73,7 @@ pub(super) struct Settings {
 /// Named settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Preset {
-    /// Log radiance, weighted by solid angle: 400 steps
+    /// Log radiance, weighted by solid angle, as far down as it goes
     #[default]
     Thorough,
     /// What is seen on a screen under the picture's own white; highlights beyond it are left alone
@@ -98,6 +102,17 @@ enum ObjectiveName {
     Training,
 }
 
+/// The methods by the names that are typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    /// levenberg-marquardt where it applies, after exploring by adam if a latent has more than 16 vectors; else adam
+    Auto,
+    /// Damped Gauss-Newton steps to the minimum next to the start; for objectives that look at each pixel alone
+    LevenbergMarquardt,
+    /// As the articles have it
+    Adam,
+}
+
 /// Whether the exposure is a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Exposure {
@@ -119,8 +134,12 @@ pub(super) enum Start {
 }
 
 impl Settings {
-    pub(super) fn config(&self) -> Result<FitConfig> {
+    /// `light`: for the light on a surface, not for a picture of it.
+    pub(super) fn config(&self, light: bool) -> Result<FitConfig> {
         let mut config = match self.preset {
+            Preset::Thorough | Preset::Display if light => {
+                FitConfig { plateau: Some(PLATEAU), ..FitConfig::light() }
+            }
             Preset::Thorough => FitConfig { plateau: Some(PLATEAU), ..FitConfig::thorough() },
             Preset::Display => FitConfig { plateau: Some(PLATEAU), ..FitConfig::display() },
             Preset::Reference => FitConfig::reference_helper(1e-2, 2e-3, 2000),
@@ -128,6 +147,18 @@ impl Settings {
         };
         if let Some(steps) = self.steps {
             config = config.in_steps(steps);
+        }
+        match (self.method, self.rate) {
+            (Some(MethodName::LevenbergMarquardt), Some(_)) => bail!(
+                "--rate: levenberg-marquardt finds its steps itself; leave --rate out, or take --method adam or auto"
+            ),
+            (Some(MethodName::LevenbergMarquardt), None) if light => bail!(
+                "--method levenberg-marquardt does not apply to the light on a surface; leave it out, or take adam"
+            ),
+            (Some(MethodName::LevenbergMarquardt), None) => config.method = Method::LevenbergMarquardt,
+            (Some(MethodName::Auto), _) => config.method = Method::Auto,
+            (Some(MethodName::Adam), _) | (None, Some(_)) => config.method = Method::Adam,
+            (None, None) => {}
         }
         if let Some((first, last)) = self.rate {
             config.learning_rate = match (config.learning_rate, last) {

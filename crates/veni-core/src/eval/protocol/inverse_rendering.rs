@@ -205,7 +205,7 @@ fn fitted(subject: &Subject, grid: Equirect, item: &Item, set: Set, ks: f32) -> 
     let small = Equirect::new(set.lights, set.lights / 2);
     let dark = subject.decode(small, std::slice::from_ref(&start))?.concat();
     start.log_exposure = matching_exposure(&image, &picture, dark.as_chunks().0);
-    let config = FitConfig { prior: PRIOR, free_exposure: true, ..FitConfig::thorough().in_steps(set.steps) };
+    let config = FitConfig { prior: PRIOR, free_exposure: true, ..FitConfig::light().in_steps(set.steps) };
     let (images, prior, starts) = ([image], subject.prior(), [start]);
     let FitResult { latents, last, .. } =
         fit_shaded(subject.fit_decoder(), &images, Some(&prior), &starts, &config, &mut |_, _| {})?;

@@ -11,8 +11,10 @@
 
 mod backward;
 mod chain;
+mod normal;
 mod operations;
 mod outer;
+mod pass;
 #[cfg(feature = "learn")]
 pub(crate) mod perceptron;
 mod transposed;
@@ -28,6 +30,8 @@ use super::Field;
 use super::aligned::Aligned;
 use backward::{Backward, Sums};
 
+pub(super) use normal::Joint;
+pub use normal::{Curved, NormalEquations};
 pub(super) use transposed::Transposed;
 
 /// Fewest directions of one task: a few blocks, so that all cores finish together.

@@ -103,31 +103,26 @@ pub(super) fn accumulate_product<S: Simd>(simd: S, sum: S::f32s, a: &Row<S>, b: 
     (0..VECTORS).fold(sum, |sum, v| simd.mul_add_e_f32s(a[v], b[v], sum))
 }
 
-/// Backward of the encoding: d⟨z, d⟩ of every latent vector, times d_x and d_y, into `sums` [N, 2].
+/// Backward of the encoding: the gradient by every directional input ⟨z, d⟩, given to `each` as the input's index, the
+/// number of the vector in the row, and the vector.
 #[inline(always)]
-pub(super) fn decode<S: Simd>(
+pub(super) fn phases<S: Simd>(
     simd: S,
     inputs: std::ops::Range<usize>,
     features: &[Row<S>],
     gradient: &[Row<S>],
-    direction: &[Row<S>],
-    sums: &mut [S::f32s],
+    mut each: impl FnMut(usize, usize, S::f32s),
 ) {
     let (features, _) = features.as_chunks::<5>();
     let (gradient, _) = gradient.as_chunks::<5>();
-    let (pairs, _) = sums.as_chunks_mut::<2>();
     let (slow, fast) = (simd.splat_f32s(TAU), simd.splat_f32s(4.0 * TAU));
-    // the last two inputs, d_z and |d_xy|, are beyond the latent's vectors
     for ((j, [sin1, sin4, cos1, cos4, _]), [g_sin1, g_sin4, g_cos1, g_cos4, g]) in
         inputs.zip(features).zip(gradient)
     {
-        let Some([dx, dy]) = pairs.get_mut(j) else { return };
         for v in 0..VECTORS {
             let one = turn(simd, [g_sin1[v], g_cos1[v]], [sin1[v], cos1[v]]);
             let four = turn(simd, [g_sin4[v], g_cos4[v]], [sin4[v], cos4[v]]);
-            let p = simd.mul_add_e_f32s(one, slow, simd.mul_add_e_f32s(four, fast, g[v]));
-            *dx = simd.mul_add_e_f32s(p, direction[0][v], *dx);
-            *dy = simd.mul_add_e_f32s(p, direction[1][v], *dy);
+            each(j, v, simd.mul_add_e_f32s(one, slow, simd.mul_add_e_f32s(four, fast, g[v])));
         }
     }
 }

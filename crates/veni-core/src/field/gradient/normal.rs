@@ -1,0 +1,310 @@
+//! The normal equations of Gauss and Newton: how a loss on log radiance curves with the latent, seen through the
+//! decoder's own derivatives.
+//!
+//! Every direction goes forward once and backward three times, once for each colour. That leaves the rows of the
+//! Jacobian J = ∂(log radiance)/∂(latent) lane by lane, and their products Jᵀ diag(ℓ″) J and Jᵀ ℓ′ are summed
+//! while they are there: no Jacobian is ever kept.
+
+use std::ops::Range;
+
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::operations::{accumulate_products, phases};
+use super::outer::{self, Wide};
+use super::pass::{Pass, Stations, block, flat, flat_mut, lane_sum};
+use crate::field::aligned::Aligned;
+use crate::field::block::{Row, VECTORS, product};
+use crate::field::mlp::{Matrix, Mlp, PANEL};
+use crate::field::weights::{Affine, Weights};
+use crate::field::{Field, Folded};
+
+/// Fewest directions of a task, and about how many tasks: each has a matrix of its own.
+const TASK: usize = 96;
+const TASKS: usize = 16;
+
+/// A direction's loss around a log radiance, channel by channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Curved {
+    /// ℓ.
+    pub loss: f64,
+    /// ∂ℓ/∂p.
+    pub slope: [f32; 3],
+    /// What stands for ∂²ℓ/∂p², at least 0: of a squared error w (p − t)² it is 2w.
+    pub curvature: [f32; 3],
+}
+
+/// Σᵢ ℓᵢ and its model ℓ + gᵀδ + ½ δᵀHδ for a small change δ of the latent: x, y, z of the N vectors one after the
+/// other, then the log exposure; 3N + 1 coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalEquations {
+    /// Σᵢ ℓᵢ.
+    pub loss: f64,
+    /// g, as [`Field::gradient`] gives it.
+    pub gradient: Vec<f64>,
+    /// H = Σᵢ Jᵢᵀ diag(ℓᵢ″) Jᵢ, row-major: symmetric and positive semidefinite. The decoder's own second derivatives
+    /// are left out.
+    pub matrix: Vec<f64>,
+}
+
+impl Field {
+    /// The normal equations of Σᵢ ℓᵢ at the latent. `loss(i, p)` gets the log radiance p (r, g, b, exposure included)
+    /// in direction i.
+    ///
+    /// Costs about the multiply-adds of `4 + N/35` calls of [`Field::log_radiance_batch`], on all cores, and 16
+    /// matrices of memory whatever the number of directions. The same bits for any number of threads.
+    pub fn normal_equations(
+        &self,
+        directions: &[[f32; 3]],
+        loss: impl Fn(usize, [f32; 3]) -> Curved + Sync,
+    ) -> NormalEquations {
+        let (weights, folded) = (&*self.weights, &*self.folded);
+        let chain = Chain::new(weights, folded);
+        let unknowns = 3 * weights.latent_vectors + 1;
+        let task = directions.len().div_ceil(TASKS).next_multiple_of(TASK).max(TASK);
+        let tasks = directions.par_chunks(task).enumerate();
+        let parts = tasks.map_init(Aligned::default, |scratch, (at, directions)| {
+            let mut sums = NormalEquations::zero(unknowns);
+            let (loss, first) = (&loss, at * task);
+            pulp::Arch::new().dispatch(Normal {
+                mlp: &weights.mlp,
+                folded,
+                chain: &chain,
+                directions,
+                loss: &|i, p| loss(first + i, p),
+                sums: &mut sums,
+                scratch,
+            });
+            sums
+        });
+        let mut total = NormalEquations::zero(unknowns);
+        // collected in order, added in order
+        for part in parts.collect::<Vec<_>>() {
+            total.add(&part);
+        }
+        total
+    }
+}
+
+impl NormalEquations {
+    fn zero(unknowns: usize) -> Self {
+        Self { loss: 0.0, gradient: vec![0.0; unknowns], matrix: vec![0.0; unknowns * unknowns] }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.loss += other.loss;
+        let pairs = self.gradient.iter_mut().zip(&other.gradient);
+        for (sum, value) in pairs.chain(self.matrix.iter_mut().zip(&other.matrix)) {
+            *sum += value;
+        }
+    }
+}
+
+/// The attention's linear maps out ∘ value of one layer, [3N, h]: a row for a₁, a₂ and z of every vector.
+#[derive(Debug)]
+pub(in crate::field) struct Joint(Vec<f32>);
+
+impl Joint {
+    pub(in crate::field) fn new(value: &Affine, out: &Affine) -> Self {
+        let (inner, h) = (value.bias.len(), out.bias.len());
+        let rows = value.weight.chunks_exact(inner).flat_map(|row| {
+            let mut sum = vec![0.0; h];
+            for (v, out) in row.iter().zip(out.weight.chunks_exact(h)) {
+                sum.iter_mut().zip(out).for_each(|(sum, w)| *sum += v * w);
+            }
+            sum
+        });
+        Self(rows.collect())
+    }
+}
+
+/// From the gradient by what a layer's attention adds to that by the vectors' radii and heights.
+///
+/// The invariants a₁, a₂ of a vector depend on r² = x² + y² alone: their gradients by x and y are those by a
+/// number ρ, times x and y.
+struct Chain<'a> {
+    /// x, y of the vectors.
+    vectors: &'a [[f32; 2]],
+    /// One per layer: [h, 2N], ρ of all vectors, then z of all.
+    layers: Vec<Matrix>,
+}
+
+impl<'a> Chain<'a> {
+    fn new(weights: &Weights, folded: &'a Folded) -> Self {
+        let (h, vectors) = (weights.mlp.hidden, folded.vectors.as_slice());
+        let slopes: Vec<[f32; 2]> = vectors
+            .iter()
+            .map(|[x, y]| weights.invariant.slope(f64::from(*x).hypot(f64::from(*y))).map(|s| s as f32))
+            .collect();
+        let n = vectors.len();
+        let layer = |Joint(joint): &Joint| {
+            let mut matrix = vec![0.0; 2 * n * h];
+            for (j, (rows, [p, q])) in joint.chunks_exact(3 * h).zip(&slopes).enumerate() {
+                let (a, b, z) = (&rows[..h], &rows[h..2 * h], &rows[2 * h..]);
+                for i in 0..h {
+                    matrix[2 * n * i + j] = p * a[i] + q * b[i];
+                    matrix[2 * n * i + n + j] = z[i];
+                }
+            }
+            Matrix::new(&matrix, 2 * n)
+        };
+        Self { vectors, layers: weights.joint().iter().map(layer).collect() }
+    }
+
+    /// 2N rounded up to whole panels.
+    fn padded(&self) -> usize {
+        (2 * self.vectors.len()).next_multiple_of(PANEL)
+    }
+}
+
+/// A loss by direction and log radiance.
+type CurvedLoss<'a> = dyn Fn(usize, [f32; 3]) -> Curved + Sync + 'a;
+
+/// Work for one thread: any number of directions.
+struct Normal<'a> {
+    mlp: &'a Mlp,
+    folded: &'a Folded,
+    chain: &'a Chain<'a>,
+    directions: &'a [[f32; 3]],
+    loss: &'a CurvedLoss<'a>,
+    sums: &'a mut NormalEquations,
+    scratch: &'a mut Aligned,
+}
+
+impl WithSimd for Normal<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { mlp, folded, chain, directions, loss, sums, scratch } = self;
+        let (lanes, unknowns) = (block::<S>(), sums.gradient.len());
+        let panels = outer::panels::<S>(unknowns);
+        let wide = size_of::<Wide<S>>() / size_of::<S::f32s>();
+        let rows = Pass::<S>::rows(mlp) + 2 * 3 + 2 * unknowns + chain.padded();
+        let vectors = wide * panels * (lanes + unknowns) + unknowns;
+        let scratch = scratch.at_least(lanes * rows + S::F32_LANES * vectors);
+        let (all, room) = S::as_mut_simd_f32s(scratch).0.split_at_mut(VECTORS * rows);
+        let (mut pass, rest) = Pass::new(simd, mlp, folded, all.as_chunks_mut::<VECTORS>().0);
+        let (slopes, rest) = rest.split_at_mut(3);
+        let (curvatures, rest) = rest.split_at_mut(3);
+        let (jacobian, rest) = rest.split_at_mut(unknowns);
+        let (weighted, polar) = rest.split_at_mut(unknowns);
+        let zero = simd.splat_f32s(0.0);
+        room[..vectors].fill(zero);
+        let (turned, room) = room.split_at_mut(wide * panels * lanes);
+        let (matrix, room) = room.split_at_mut(wide * panels * unknowns);
+        let (turned, matrix) = (turned.as_chunks_mut().0, matrix.as_chunks_mut().0);
+        let gradient = &mut room[..unknowns];
+        // the last coordinate, the log exposure, adds to every log radiance alike
+        jacobian[unknowns - 1] = [simd.splat_f32s(1.0); VECTORS];
+        let zeros = vec![0.0; chain.padded()];
+        let mut rows = Rows { chain, zeros: &zeros, jacobian, polar };
+
+        for (b, directions) in directions.chunks(lanes).enumerate() {
+            pass.forward(simd, directions);
+            {
+                let rgb = flat::<S>(pass.rgb);
+                let (slopes, curvatures) = (flat_mut::<S>(slopes), flat_mut::<S>(curvatures));
+                // idle lanes of a short block count nothing
+                slopes.fill(0.0);
+                curvatures.fill(0.0);
+                for i in 0..directions.len() {
+                    let p = [0, 1, 2].map(|c| rgb[c * lanes + i] + folded.log_exposure);
+                    let curved = loss(b * lanes + i, p);
+                    sums.loss += curved.loss;
+                    for c in 0..3 {
+                        slopes[c * lanes + i] = curved.slope[c];
+                        curvatures[c * lanes + i] = curved.curvature[c];
+                    }
+                }
+            }
+            for c in 0..3 {
+                pass.adjoint.as_flattened_mut().fill(zero);
+                pass.adjoint[c] = [simd.splat_f32s(1.0); VECTORS];
+                rows.polar.as_flattened_mut().fill(zero);
+                pass.backward(simd, &mut rows);
+                rows.finish(simd);
+                for ((weighted, row), sum) in
+                    weighted.iter_mut().zip(rows.jacobian.iter()).zip(&mut *gradient)
+                {
+                    for v in 0..VECTORS {
+                        weighted[v] = simd.mul_f32s(row[v], curvatures[c][v]);
+                    }
+                    accumulate_products(
+                        simd,
+                        std::slice::from_ref(row),
+                        std::slice::from_ref(&slopes[c]),
+                        std::slice::from_mut(sum),
+                    );
+                }
+                outer::turn_round::<S>(weighted, turned);
+                outer::add(simd, rows.jacobian, turned, matrix);
+            }
+        }
+        for (sum, vector) in sums.gradient.iter_mut().zip(gradient) {
+            *sum += lane_sum::<S>(vector);
+        }
+        let mut row = vec![0.0; unknowns];
+        for (k, sums) in sums.matrix.chunks_exact_mut(unknowns).enumerate() {
+            row.fill(0.0);
+            outer::read::<S>(matrix, unknowns, k, &mut row);
+            sums.iter_mut().zip(&row).for_each(|(sum, value)| *sum += f64::from(*value));
+        }
+    }
+}
+
+/// The rows of the Jacobian of one colour, for a block.
+struct Rows<'a, S: Simd> {
+    chain: &'a Chain<'a>,
+    zeros: &'a [f32],
+    /// A row for each coordinate.
+    jacobian: &'a mut [Row<S>],
+    /// By ρ and z of all vectors.
+    polar: &'a mut [Row<S>],
+}
+
+impl<S: Simd> Rows<'_, S> {
+    /// Adds what came through the attention.
+    #[inline(always)]
+    fn finish(&mut self, simd: S) {
+        let (radii, heights) = self.polar.split_at(self.chain.vectors.len());
+        let coordinates = self.jacobian.as_chunks_mut::<3>().0.iter_mut().zip(self.chain.vectors);
+        for (([by_x, by_y, by_z], [x, y]), (radius, height)) in coordinates.zip(radii.iter().zip(heights)) {
+            let (x, y) = (simd.splat_f32s(*x), simd.splat_f32s(*y));
+            for v in 0..VECTORS {
+                by_x[v] = simd.mul_add_e_f32s(radius[v], x, by_x[v]);
+                by_y[v] = simd.mul_add_e_f32s(radius[v], y, by_y[v]);
+            }
+            *by_z = *height;
+        }
+    }
+}
+
+impl<S: Simd> Stations<S> for Rows<'_, S> {
+    #[inline(always)]
+    fn added(&mut self, simd: S, at: usize, gradient: &[Row<S>]) {
+        // nothing of the latent is added after the last layer
+        if let Some(matrix) = self.chain.layers.get(at) {
+            product::<S, true, false>(simd, matrix, self.zeros, gradient, self.polar);
+        }
+    }
+
+    #[inline(always)]
+    fn encoded(
+        &mut self,
+        simd: S,
+        inputs: Range<usize>,
+        features: &[Row<S>],
+        gradient: &[Row<S>],
+        direction: &[Row<S>],
+    ) {
+        let (pairs, _) = self.jacobian.as_chunks_mut::<3>();
+        phases(simd, inputs, features, gradient, |j, v, p| {
+            // the last two inputs, d_z and |d_xy|, are beyond the latent's vectors
+            if let Some([x, y, _]) = pairs.get_mut(j) {
+                x[v] = simd.mul_f32s(p, direction[0][v]);
+                y[v] = simd.mul_f32s(p, direction[1][v]);
+            }
+        });
+    }
+}
