@@ -1,12 +1,12 @@
 //! The ways down: Adam on everything at once, Levenberg–Marquardt image by image.
 
+use super::FitResult;
 use super::adam::Variable;
 use super::config::{FitConfig, Method};
 use super::levenberg_marquardt::{Search, Slopes};
 use super::network::{Evaluation, ImageLoss, Network};
 use super::pixel::PixelLoss;
 use super::stall::Stall;
-use super::FitResult;
 use crate::latent::{Latent, Prior};
 use crate::{Error, Result};
 

@@ -65,9 +65,9 @@ impl<'a> PixelLoss<'a> {
         if weight == 0.0 {
             return out;
         }
-        for c in 0..3 {
+        for (c, p) in prediction.into_iter().enumerate() {
             let k = 3 * pixel + c;
-            let (p, i) = (prediction[c], f64::from(self.image[k]));
+            let i = f64::from(self.image[k]);
             let error = p - i;
             if error > 0.0 && self.clipped.is_some_and(|clipped| clipped[k]) {
                 continue;
