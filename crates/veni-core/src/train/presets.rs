@@ -179,7 +179,7 @@ fn divergence_weight(latent_vectors: usize) -> f64 {
 }
 
 fn small(latent_vectors: usize) -> TrainConfig {
-    let steps = 22_000;
+    let steps = 12_000;
     let adam = AdamConfig { weight_decay: 0.05, ..AdamConfig::default() };
     TrainConfig {
         seed: 0,

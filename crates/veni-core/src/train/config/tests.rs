@@ -97,8 +97,8 @@ fn a_stage_is_the_run_with_its_changes() {
     assert_eq!(b.config.decoder.learning_rate, LearningRate::Constant { rate: 1e-5 });
     assert_eq!((a.config.augment.mix, b.config.augment.mix), (config.augment.mix, 0.0));
     // what fell until the run's last step falls until the stage's
-    assert_eq!(a.config.decoder.learning_rate.at(300), rate.at(22_000));
-    assert_eq!(b.config.encoder.as_ref().unwrap().learning_rate.at(200), rate.at(22_000));
+    assert_eq!(a.config.decoder.learning_rate.at(300), rate.at(12_000));
+    assert_eq!(b.config.encoder.as_ref().unwrap().learning_rate.at(200), rate.at(12_000));
     assert_eq!(a.config.seed, config.seed);
     assert_ne!(b.config.seed, config.seed);
     // a single setting of a stage, and its steps with the run's
