@@ -5,7 +5,8 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use super::operations::{accumulate, accumulate_product, accumulate_products, phases};
-use super::pass::{Pass, Stations, Tape, block, flat, flat_mut, lane_sum};
+use super::outer;
+use super::pass::{Pass, Stations, Tape, flat, flat_mut, lane_sum};
 use super::weight_sums::{WeightRoom, WeightSums, vector};
 use crate::field::Folded;
 use crate::field::aligned::Aligned;
@@ -65,7 +66,7 @@ impl WithSimd for Backward<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { mlp, folded, directions, loss, sums, weights, scratch } = self;
-        let (lanes, added) = (block::<S>(), (1 + mlp.layers.len()) * mlp.hidden);
+        let (lanes, added) = (outer::lanes::<S>(), (1 + mlp.layers.len()) * mlp.hidden);
         let sum_rows = (added + 2 * folded.vectors.len()).div_ceil(VECTORS);
         let rows = Pass::<S>::rows(mlp) + sum_rows;
         let room = if weights.is_some() { WeightRoom::<S>::vectors(mlp) } else { 0 };

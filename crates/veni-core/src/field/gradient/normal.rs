@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::operations::{accumulate_products, phases};
 use super::outer::{self, Wide};
-use super::pass::{Pass, Stations, block, flat, flat_mut, lane_sum};
+use super::pass::{Pass, Stations, flat, flat_mut, lane_sum};
 use crate::field::aligned::Aligned;
 use crate::field::block::{Row, VECTORS, product};
 use crate::field::mlp::{Matrix, Mlp, PANEL};
@@ -177,7 +177,7 @@ impl WithSimd for Normal<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { mlp, folded, chain, directions, loss, sums, scratch } = self;
-        let (lanes, unknowns) = (block::<S>(), sums.gradient.len());
+        let (lanes, unknowns) = (outer::lanes::<S>(), sums.gradient.len());
         let panels = outer::panels::<S>(unknowns);
         let wide = size_of::<Wide<S>>() / size_of::<S::f32s>();
         let rows = Pass::<S>::rows(mlp) + 2 * 3 + 2 * unknowns + chain.padded();

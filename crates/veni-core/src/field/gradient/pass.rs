@@ -6,7 +6,7 @@ use pulp::Simd;
 
 use super::operations::{mask, scale_and_shift, standardise, unstandardise};
 use crate::field::Folded;
-use crate::field::block::{Row, VECTORS, encode, product, scatter};
+use crate::field::block::{Row, encode, product, scatter};
 use crate::field::mlp::{Mlp, PANEL};
 
 /// Where the way back passes, and the gradient there. Called in the order of that way: the output, the last layer
@@ -222,9 +222,4 @@ pub(super) fn flat_mut<S: Simd>(rows: &mut [Row<S>]) -> &mut [f32] {
 pub(super) fn lane_sum<S: Simd>(vector: &S::f32s) -> f64 {
     let lanes = bytemuck::cast_slice::<S::f32s, f32>(std::slice::from_ref(vector));
     lanes.iter().map(|x| f64::from(*x)).sum()
-}
-
-/// Directions of a block.
-pub(super) const fn block<S: Simd>() -> usize {
-    VECTORS * S::F32_LANES
 }
