@@ -74,7 +74,8 @@ impl Reconstruction {
     }
 
     /// The best the decoder can do: each panorama decoded from a latent optimised for it under `decoder`, the model's own
-    /// in either form. The fit sees the panoramas averaged over `factor` × `factor` pixels (1: every pixel); the scores see every pixel.
+    /// in either form. The fit sees the panoramas averaged over `factor` × `factor` pixels (1: every pixel); the scores
+    /// see every pixel.
     ///
     /// # Errors
     /// As [`Veni::stripes`] and [`fit`].

@@ -1,10 +1,8 @@
 //! One task: its directions in blocks, each forward with its activations kept, then backward.
 
-use std::ops::Range;
-
 use pulp::{Simd, WithSimd};
 
-use super::operations::{accumulate, accumulate_product, accumulate_products, phases};
+use super::operations::{accumulate, accumulate_product, accumulate_products};
 use super::outer;
 use super::pass::{Pass, Stations, Tape, flat, flat_mut, lane_sum};
 use super::weight_sums::{WeightRoom, WeightSums, vector};
@@ -76,6 +74,7 @@ impl WithSimd for Backward<'_> {
         let rest = rest.as_flattened_mut();
         rest.fill(simd.splat_f32s(0.0));
         let (added, vectors) = rest.split_at_mut(added);
+        let (vectors, _) = vectors.as_chunks_mut::<2>();
         let (weights, room) = match weights {
             Some(weights) => (Some(weights), Some(WeightRoom::new(simd, mlp, room))),
             None => (None, None),
@@ -104,7 +103,7 @@ impl WithSimd for Backward<'_> {
         for (sum, vector) in sums.added.iter_mut().zip(added) {
             *sum += lane_sum::<S>(vector);
         }
-        for (sum, vector) in sums.vectors.as_flattened_mut().iter_mut().zip(vectors) {
+        for (sum, vector) in sums.vectors.as_flattened_mut().iter_mut().zip(vectors.as_flattened()) {
             *sum += lane_sum::<S>(vector);
         }
         if let (Some(sums), Some(room)) = (weights, room) {
@@ -119,7 +118,7 @@ struct LaneSums<'a, S: Simd> {
     /// As [`Sums::added`].
     added: &'a mut [S::f32s],
     /// As [`Sums::vectors`].
-    vectors: &'a mut [S::f32s],
+    vectors: &'a mut [[S::f32s; 2]],
     /// By the weights, if they are wanted.
     room: Option<WeightRoom<'a, S>>,
 }
@@ -131,22 +130,10 @@ impl<S: Simd> Stations<S> for LaneSums<'_, S> {
     }
 
     #[inline(always)]
-    fn encoded(
-        &mut self,
-        simd: S,
-        inputs: Range<usize>,
-        features: &[Row<S>],
-        gradient: &[Row<S>],
-        direction: &[Row<S>],
-    ) {
-        let (sums, _) = self.vectors.as_chunks_mut::<2>();
-        phases(simd, inputs, features, gradient, |j, v, p| {
-            // the last two inputs, d_z and |d_xy|, are beyond the latent's vectors
-            if let Some([x, y]) = sums.get_mut(j) {
-                *x = simd.mul_add_e_f32s(p, direction[0][v], *x);
-                *y = simd.mul_add_e_f32s(p, direction[1][v], *y);
-            }
-        });
+    fn product(&mut self, simd: S, j: usize, _v: usize, gradient: S::f32s, direction: [S::f32s; 2]) {
+        let [x, y] = &mut self.vectors[j];
+        *x = simd.mul_add_e_f32s(gradient, direction[0], *x);
+        *y = simd.mul_add_e_f32s(gradient, direction[1], *y);
     }
 
     #[inline(always)]

@@ -64,11 +64,8 @@ impl Field {
     ) -> Gradient {
         let (weights, folded) = (&*self.weights, &*self.folded);
         let (mlp, n) = (&weights.mlp, weights.latent_vectors);
-        let task = directions.len().div_ceil(TASKS).next_multiple_of(TASK).max(TASK);
-        let tasks = directions.par_chunks(task).enumerate();
-        let parts = tasks.map_init(Aligned::default, |scratch, (at, directions)| {
+        let parts = in_tasks(directions, TASK, TASKS, |scratch, first, directions| {
             let mut sums = Sums::new(mlp, n);
-            let (loss, first) = (&loss, at * task);
             pulp::Arch::new().dispatch(Backward {
                 mlp,
                 folded,
@@ -81,10 +78,21 @@ impl Field {
             sums
         });
         let mut total = Sums::new(mlp, n);
-        // collected in order, added in order
-        for part in parts.collect::<Vec<_>>() {
-            total.add(&part);
-        }
+        parts.iter().for_each(|part| total.add(part));
         chain::to_latent(weights, folded, &total)
     }
+}
+
+/// What `work` gives for parts of the directions, in their order, and in the same parts whatever the number of threads:
+/// at most `tasks` of a multiple of `least` directions. It gets room that it may keep, the index of the first
+/// direction, and the directions.
+fn in_tasks<T: Send>(
+    directions: &[[f32; 3]],
+    least: usize,
+    tasks: usize,
+    work: impl Fn(&mut Aligned, usize, &[[f32; 3]]) -> T + Sync,
+) -> Vec<T> {
+    let task = directions.len().div_ceil(tasks).next_multiple_of(least).max(least);
+    let parts = directions.par_chunks(task).enumerate();
+    parts.map_init(Aligned::default, |scratch, (at, part)| work(scratch, at * task, part)).collect()
 }

@@ -5,12 +5,10 @@
 //! Jacobian J = ∂(log radiance)/∂(latent) lane by lane, and their products Jᵀ diag(ℓ″) J and Jᵀ ℓ′ are summed
 //! while they are there: no Jacobian is ever kept.
 
-use std::ops::Range;
-
 use pulp::{Simd, WithSimd};
-use rayon::prelude::*;
 
-use super::operations::{accumulate_products, phases};
+use super::in_tasks;
+use super::operations::accumulate_product;
 use super::outer::{self, Wide};
 use super::pass::{Pass, Stations, flat, flat_mut, lane_sum};
 use crate::field::aligned::Aligned;
@@ -61,11 +59,8 @@ impl Field {
         let (weights, folded) = (&*self.weights, &*self.folded);
         let chain = Chain::new(weights, folded);
         let unknowns = 3 * weights.latent_vectors + 1;
-        let task = directions.len().div_ceil(TASKS).next_multiple_of(TASK).max(TASK);
-        let tasks = directions.par_chunks(task).enumerate();
-        let parts = tasks.map_init(Aligned::default, |scratch, (at, directions)| {
+        let parts = in_tasks(directions, TASK, TASKS, |scratch, first, directions| {
             let mut sums = NormalEquations::zero(unknowns);
-            let (loss, first) = (&loss, at * task);
             pulp::Arch::new().dispatch(Normal {
                 mlp: &weights.mlp,
                 folded,
@@ -78,10 +73,7 @@ impl Field {
             sums
         });
         let mut total = NormalEquations::zero(unknowns);
-        // collected in order, added in order
-        for part in parts.collect::<Vec<_>>() {
-            total.add(&part);
-        }
+        parts.iter().for_each(|part| total.add(part));
         total
     }
 }
@@ -230,12 +222,7 @@ impl WithSimd for Normal<'_> {
                     for v in 0..VECTORS {
                         weighted[v] = simd.mul_f32s(row[v], curvatures[c][v]);
                     }
-                    accumulate_products(
-                        simd,
-                        std::slice::from_ref(row),
-                        std::slice::from_ref(&slopes[c]),
-                        std::slice::from_mut(sum),
-                    );
+                    *sum = accumulate_product(simd, *sum, row, &slopes[c]);
                 }
                 outer::turn_round::<S>(weighted, turned);
                 outer::add(simd, rows.jacobian, turned, matrix);
@@ -290,21 +277,9 @@ impl<S: Simd> Stations<S> for Rows<'_, S> {
     }
 
     #[inline(always)]
-    fn encoded(
-        &mut self,
-        simd: S,
-        inputs: Range<usize>,
-        features: &[Row<S>],
-        gradient: &[Row<S>],
-        direction: &[Row<S>],
-    ) {
-        let (pairs, _) = self.jacobian.as_chunks_mut::<3>();
-        phases(simd, inputs, features, gradient, |j, v, p| {
-            // the last two inputs, d_z and |d_xy|, are beyond the latent's vectors
-            if let Some([x, y, _]) = pairs.get_mut(j) {
-                x[v] = simd.mul_f32s(p, direction[0][v]);
-                y[v] = simd.mul_f32s(p, direction[1][v]);
-            }
-        });
+    fn product(&mut self, simd: S, j: usize, v: usize, gradient: S::f32s, direction: [S::f32s; 2]) {
+        for (row, direction) in self.jacobian[3 * j..].iter_mut().zip(direction) {
+            row[v] = simd.mul_f32s(gradient, direction);
+        }
     }
 }

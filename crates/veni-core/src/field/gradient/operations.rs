@@ -106,7 +106,7 @@ pub(super) fn accumulate_product<S: Simd>(simd: S, sum: S::f32s, a: &Row<S>, b: 
 /// Backward of the encoding: the gradient by every directional input ⟨z, d⟩, given to `each` as the input's index, the
 /// number of the vector in the row, and the vector.
 #[inline(always)]
-pub(super) fn phases<S: Simd>(
+pub(super) fn unencode<S: Simd>(
     simd: S,
     inputs: std::ops::Range<usize>,
     features: &[Row<S>],

@@ -1,10 +1,8 @@
 //! One block of directions through the network and back, with its activations kept in between.
 
-use std::ops::Range;
-
 use pulp::Simd;
 
-use super::operations::{mask, scale_and_shift, standardise, unstandardise};
+use super::operations::{mask, scale_and_shift, standardise, unencode, unstandardise};
 use crate::field::Folded;
 use crate::field::block::{Row, encode, product, scatter};
 use crate::field::mlp::{Mlp, PANEL};
@@ -15,15 +13,8 @@ pub(super) trait Stations<S: Simd> {
     /// By what is added before the first layer (`at` = 0), or after `at` layers.
     fn added(&mut self, simd: S, at: usize, gradient: &[Row<S>]);
 
-    /// By the features of some directional inputs: what [`phases`](super::operations::phases) takes.
-    fn encoded(
-        &mut self,
-        simd: S,
-        inputs: Range<usize>,
-        features: &[Row<S>],
-        gradient: &[Row<S>],
-        direction: &[Row<S>],
-    );
+    /// By the product of latent vector `j` with the directions in vector `v` of a row, and these directions' x and y.
+    fn product(&mut self, simd: S, j: usize, v: usize, gradient: S::f32s, direction: [S::f32s; 2]);
 
     /// By the three outputs, x being what the output layer was given.
     #[inline(always)]
@@ -177,7 +168,9 @@ impl<'a, S: Simd> Pass<'a, S> {
     /// From [`Pass::adjoint`] back to the inputs of the block that went forward last. May be called again.
     #[inline(always)]
     pub(super) fn backward(&mut self, simd: S, stations: &mut impl Stations<S>) {
-        let Self { mlp, features, direction, adjoint, last, x, y, back, encodings, tapes, zeros, .. } = self;
+        let Self {
+            mlp, folded, features, direction, adjoint, last, x, y, back, encodings, tapes, zeros, ..
+        } = self;
         let (transposed, hidden, padded) = (mlp.transposed(), mlp.hidden, mlp.padded());
         stations.output(simd, &last[..hidden], adjoint);
         product::<S, false, false>(simd, &transposed.output, zeros, adjoint, x);
@@ -201,7 +194,11 @@ impl<'a, S: Simd> Pass<'a, S> {
         for ((chunk, matrix), rows) in mlp.input.iter().zip(&transposed.input).zip(features.iter()) {
             product::<S, false, false>(simd, matrix, zeros, x, back);
             let features = &encodings[from..from + rows];
-            stations.encoded(simd, chunk.inputs.clone(), features, back, direction);
+            // the last two inputs, d_z and |d_xy|, are beyond the latent's vectors
+            let inputs = chunk.inputs.start..chunk.inputs.end.min(folded.vectors.len());
+            unencode(simd, inputs, features, back, |j, v, gradient| {
+                stations.product(simd, j, v, gradient, [direction[0][v], direction[1][v]]);
+            });
             from += rows;
         }
         stations.input(simd, encodings, &x[..hidden]);
