@@ -206,3 +206,24 @@ fn the_first_command_of_a_newcomer_gives_a_sky() {
         mean(256..384)
     );
 }
+
+#[cfg(feature = "pretrained-large")]
+#[test]
+fn larger_models_inside_the_program_go_by_their_size() {
+    let dir = Dir::new();
+    for (size, vectors) in [("27", 9), ("147", 49), ("300", 100)] {
+        let sky = format!("{size}.exr");
+        dir.ok(&["bake", "--model", size, "--seed", "7", "--size", "32", "-o", &sky]);
+        let latent = &dir.json(&["inspect", &sky])[0]["latent"];
+        assert_eq!(latent["n"].as_u64(), Some(vectors), "{latent}");
+        // it goes back through its own model only
+        dir.ok(&["bake", &sky, "--model", size, "--size", "16", "-o", "again.png", "--force"]);
+    }
+    dir.refused(&["bake", "300.exr", "-o", "wrong.png"], &["100 vectors", "has 9", "--model 300"]);
+    dir.refused(&["bake", "--model", "28", "--seed", "1", "-o", "none.png"], &["28", "27, 147, 300"]);
+    // a file of that name comes first
+    std::fs::copy(model(), dir.path("147")).unwrap();
+    dir.ok(&["bake", "--model", "147", "--seed", "1", "--size", "16", "-o", "file.exr"]);
+    let latent = &dir.json(&["inspect", "file.exr"])[0]["latent"];
+    assert_ne!(latent["n"].as_u64(), Some(49), "{latent}");
+}

@@ -43,7 +43,14 @@ fn reconstruction_prints_a_table_and_keeps_its_results() {
     assert_eq!(results.len(), 8, "two panoramas, two passes and two bases");
     let figures: Vec<_> =
         std::fs::read_dir(dir.path("eval/figures")).unwrap().map(|e| e.unwrap().path()).collect();
-    assert!(figures.len() == 3 && figures.iter().all(|f| image::open(f).is_ok()), "{figures:?}");
+    assert!(figures.len() == 4 && figures.iter().all(|f| image::open(f).is_ok()), "{figures:?}");
+    // panorama, model and two bases, of 64 pixels each
+    let beside = image::open(dir.path("eval/figures/reconstruction.png")).unwrap().to_rgb8();
+    let cell = |column: u32| {
+        let left = beside.width() - (4 - column) * 68;
+        (0..32 * 64).map(|k| beside.get_pixel(left + k % 64, 20 + k / 64).0).collect::<Vec<_>>()
+    };
+    assert!((1..4).all(|column| cell(column) != cell(column - 1) && cell(column) != [[255; 3]; 2048]));
 
     let [table] = &dir.json(&args("reconstruction", &data, &[]))[..] else { panic!("one table") };
     assert_eq!(kept(&dir), results, "nothing was computed again");

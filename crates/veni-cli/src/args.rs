@@ -64,8 +64,9 @@ pub(crate) enum Command {
 /// Which model decodes (and encodes).
 #[derive(Args, Debug)]
 pub(crate) struct ModelArgs {
-    /// Model file (.safetensors, or a training run's folder) [default: the one inside this program]
-    #[arg(long, short, value_name = "FILE")]
+    /// Model file (.safetensors, or a training run's folder), or the size of one inside this program: 27, 147 or 300
+    /// numbers [default: 27]
+    #[arg(long, short, value_name = "FILE|SIZE")]
     pub(crate) model: Option<PathBuf>,
 }
 

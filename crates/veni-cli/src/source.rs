@@ -20,23 +20,37 @@ pub(crate) struct Loaded {
     pub(crate) name: String,
 }
 
-/// The model of `--model`: a file, the folder of a training run, or the one inside the program.
+/// The model of `--model`: a file, the folder of a training run, or one inside the program, by its size.
 pub(crate) fn model(args: &ModelArgs) -> Result<Loaded> {
     let Some(path) = &args.model else {
-        return Ok(Loaded { model: embedded()?, name: "the model inside this program".into() });
+        return embedded(SMALLEST);
     };
+    if let Some(numbers) = size(path) {
+        return embedded(numbers);
+    }
     let path = model_file(path)?;
     Ok(Loaded { model: Model::load(&path)?, name: path.display().to_string() })
 }
 
+/// Numbers in a latent of the model that is taken where none is named.
+const SMALLEST: usize = 27;
+
+/// A number that is no file's or folder's name.
+fn size(path: &Path) -> Option<usize> {
+    path.to_str()?.parse().ok().filter(|_| !path.exists())
+}
+
 #[cfg(feature = "pretrained")]
-#[expect(clippy::unnecessary_wraps, reason = "without the feature it fails")]
-fn embedded() -> Result<Model> {
-    Ok(Model::pretrained())
+fn embedded(numbers: usize) -> Result<Loaded> {
+    let model = Model::pretrained_of(numbers).ok_or_else(|| {
+        let sizes: Vec<_> = Model::pretrained_sizes().map(|size| size.to_string()).collect();
+        anyhow!("--model {numbers}: this program has models of {} numbers inside", sizes.join(", "))
+    })?;
+    Ok(Loaded { model, name: format!("the model of {numbers} numbers inside this program") })
 }
 
 #[cfg(not(feature = "pretrained"))]
-fn embedded() -> Result<Model> {
+fn embedded(_: usize) -> Result<Loaded> {
     bail!("this build has no model inside: name a model file with --model FILE")
 }
 
@@ -92,18 +106,32 @@ pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<
 fn check(latent: &Latent, Loaded { model, name }: &Loaded) -> Result<()> {
     let (n, expected) = (latent.vectors.len(), model.latent_vectors());
     if n != expected {
-        bail!(
-            "a latent of {n} vectors, but {name} has {expected}: name the latent's own model with --model FILE"
-        );
+        bail!("a latent of {n} vectors, but {name} has {expected}: name {}", owner(latent));
     }
     match &latent.model {
-        Some(hash) if *hash != model.hash() => bail!(
-            "a latent of model {hash}, but {name} is {}: name the latent's own model with --model FILE",
-            model.hash()
-        ),
+        Some(hash) if *hash != model.hash() => {
+            bail!("a latent of model {hash}, but {name} is {}: name {}", model.hash(), owner(latent))
+        }
         _ => Ok(()),
     }
 }
+
+/// The model that a latent belongs to, and how to name it.
+#[cfg(feature = "pretrained")]
+fn owner(latent: &Latent) -> String {
+    let numbers = 3 * latent.vectors.len();
+    match Model::pretrained_of(numbers).filter(|model| Some(model.hash()) == latent.model) {
+        Some(_) => format!("its own model, which is inside this program, with --model {numbers}"),
+        None => OWN.to_owned(),
+    }
+}
+
+#[cfg(not(feature = "pretrained"))]
+fn owner(_: &Latent) -> String {
+    OWN.to_owned()
+}
+
+const OWN: &str = "the latent's own model with --model FILE";
 
 #[cfg(feature = "learn")]
 fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {

@@ -58,8 +58,8 @@ pub(crate) struct Evaluate {
     #[arg(value_enum)]
     protocol: Protocol,
 
-    /// Models (.safetensors, or training runs' folders), each with a name for the tables if one is given
-    /// [default: the one inside this program]
+    /// Models (.safetensors, training runs' folders, or 27, 147, 300: those inside this program), each with a name for
+    /// the tables if one is given [default: veni=27]
     #[arg(long = "model", short, value_name = "[NAME=]FILE", num_args = 1..)]
     models: Vec<String>,
 

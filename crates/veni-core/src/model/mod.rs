@@ -12,6 +12,8 @@ mod decoder;
 mod file;
 mod filler;
 mod header;
+#[cfg(feature = "pretrained")]
+mod pretrained;
 mod prior;
 mod schema;
 
@@ -164,16 +166,6 @@ impl Model {
             sha.update(tensor.data.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
         }
         sha.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
-    }
-
-    /// The model inside this library (feature `pretrained`): 9 latent vectors, trained on outdoor panoramas.
-    ///
-    /// # Panics
-    /// Never in a released build: a test decodes the embedded file.
-    #[cfg(feature = "pretrained")]
-    #[allow(clippy::expect_used, reason = "the bytes are part of the program and tested with it")]
-    pub fn pretrained() -> Self {
-        Self::from_bytes(include_bytes!("../../../../assets/veni-27.safetensors")).expect("embedded model")
     }
 }
 

@@ -172,11 +172,21 @@ fn other_stored_types_are_unsupported() {
 
 #[cfg(feature = "pretrained")]
 #[test]
-fn the_embedded_model_decodes() {
-    let model = Model::pretrained();
-    let latent = Latent::from_seed(&model.prior(), 1);
-    let radiance = model.decoder().unwrap().condition(&latent).unwrap().radiance([1.0, 0.0, 0.0]);
-    assert!(radiance.iter().all(|v| v.is_finite() && *v > 0.0));
+fn embedded_models_decode() {
+    for numbers in Model::pretrained_sizes() {
+        let model = Model::pretrained_of(numbers).unwrap();
+        assert_eq!(3 * model.latent_vectors(), numbers);
+        assert!(
+            model.has_encoder() && model.has_prior() && model.info().licence.is_some(),
+            "{:?}",
+            model.info()
+        );
+        let latent = Latent::from_seed(&model.prior(), 1);
+        let radiance = model.decoder().unwrap().condition(&latent).unwrap().radiance([1.0, 0.0, 0.0]);
+        assert!(radiance.iter().all(|v| v.is_finite() && *v > 0.0), "{numbers}: {radiance:?}");
+    }
+    assert_eq!(Some(Model::pretrained()), Model::pretrained_of(27));
+    assert_eq!(Model::pretrained_of(28), None);
 }
 
 #[test]

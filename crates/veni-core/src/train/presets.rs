@@ -175,7 +175,7 @@ fn group(rate: f64, [warm_up, steps]: [u64; 2], floor: f64, adam: AdamConfig) ->
 /// Weight of the mean divergence per latent vector. Noise in each of many vectors hides what little it holds: measured at 100
 /// vectors in docs/DECISIONS.md, Training.
 fn divergence_weight(latent_vectors: usize) -> f64 {
-    if latent_vectors > 16 { 0.001 } else { 0.02 }
+    if latent_vectors > 16 { 3e-5 } else { 0.02 }
 }
 
 fn small(latent_vectors: usize) -> TrainConfig {

@@ -11,7 +11,8 @@ use crate::eval::codec::Codec;
 use crate::eval::figure::{HEAT_RANGE, Sheet, display, heat};
 use crate::eval::table::{Cell, Table};
 
-/// Table 1: means per codec; table 2: every panorama; a sheet per system: target, reconstructions, their errors.
+/// Table 1: means per codec; table 2: every panorama; a sheet per system: target, reconstructions, their errors; and of several
+/// systems a sheet with the last pass of each side by side.
 ///
 /// # Errors
 /// As coding, decoding and writing fail.
@@ -24,13 +25,17 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
         "Reconstruction of each panorama",
         &columns(&["Panorama", "System"]),
     );
+    let mut columns = Vec::new();
     for subject in run.subjects {
         let codecs = run.codecs(subject);
         let codecs: Vec<&dyn Codec> = codecs.iter().map(|codec| &**codec).collect();
-        system(run, subject.name(), &codecs, [&mut means, &mut each], &mut report)?;
+        columns.extend(system(run, subject.name(), &codecs, [&mut means, &mut each], &mut report)?);
     }
     for codec in run.others {
-        system(run, codec.system(), &[*codec], [&mut means, &mut each], &mut report)?;
+        columns.extend(system(run, codec.system(), &[*codec], [&mut means, &mut each], &mut report)?);
+    }
+    if columns.len() > 1 {
+        run.sheet("reconstruction", &side_by_side(run, &columns), &mut report)?;
     }
     means.note(quality::NOTE);
     means.note(run.optimised_note());
@@ -55,14 +60,17 @@ pub(super) fn keep_models(run: &Evaluation<'_>, share: Share) -> Result<()> {
     Ok(())
 }
 
-/// Rows and a sheet of one system.
+/// A system's name, and what it makes of every panorama in its last pass.
+type Column = (String, Vec<Vec<f32>>);
+
+/// Rows, a sheet and the last pass of one system.
 fn system(
     run: &Evaluation<'_>,
     name: &str,
     codecs: &[&dyn Codec],
     [means, each]: [&mut Table; 2],
     report: &mut Report,
-) -> Result<()> {
+) -> Result<Option<Column>> {
     let mut results = Vec::new();
     for codec in codecs {
         let result = reconstruct(run, *codec)?;
@@ -77,7 +85,24 @@ fn system(
         }
         results.push((codec.pass(), result));
     }
-    run.sheet(&format!("reconstruction-{name}"), &sheet(run, &results), report)
+    run.sheet(&format!("reconstruction-{name}"), &sheet(run, &results), report)?;
+    Ok(results.pop().map(|(_, last)| (name.to_owned(), last.images)))
+}
+
+fn side_by_side(run: &Evaluation<'_>, columns: &[Column]) -> Sheet {
+    let (grid, items) = (run.data.grid(), run.data.items());
+    let titles = columns.iter().map(|(system, _)| system.clone());
+    let titles: Vec<_> = std::iter::once("panorama".to_owned()).chain(titles).collect();
+    let names: Vec<_> = items.iter().map(Item::name).collect();
+    let mut sheet = Sheet::new(grid, &titles, &names);
+    for (row, item) in items.iter().enumerate() {
+        let images =
+            std::iter::once(&item.log_radiance).chain(columns.iter().map(|(_, images)| &images[row]));
+        for (column, image) in images.enumerate() {
+            sheet.place(column, row, &display(grid, image));
+        }
+    }
+    sheet
 }
 
 fn sheet(run: &Evaluation<'_>, results: &[(&str, Reconstructed)]) -> Sheet {

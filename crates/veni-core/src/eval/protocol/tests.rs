@@ -134,7 +134,7 @@ fn reconstruction_goes_on_where_it_was() {
     std::fs::remove_file(&one[0]).unwrap();
     let (again, computed) = run();
     assert_eq!((one.len(), computed, &again.details), (1, 1, &first.details));
-    assert!(first.figures.iter().all(|f| image::open(f).is_ok()) && first.figures.len() == 2);
+    assert!(first.figures.iter().all(|f| image::open(f).is_ok()) && first.figures.len() == 3);
 
     // another model of the same name shares nothing
     let other = [subject("tiny", 2)];
