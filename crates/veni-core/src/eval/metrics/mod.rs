@@ -7,12 +7,14 @@ mod correlation;
 mod log_error;
 mod psnr;
 mod ssim;
+mod sun;
 
 pub use alignment::{Alignment, exposure_offset, log_factor};
 pub use correlation::{pearson, ranks, spearman};
 pub use log_error::{log_error, weighted_log_error};
 pub use psnr::psnr;
 pub use ssim::ssim;
+pub use sun::{brightest, sun_error};
 
 use crate::panorama::tonemap::srgb_q98;
 

@@ -12,7 +12,7 @@ use crate::Result;
 use crate::data::Item;
 use crate::eval::codec::Codec;
 use crate::eval::lpips::Lpips;
-use crate::eval::metrics::{Alignment, scores};
+use crate::eval::metrics::{Alignment, scores, sun_error};
 use crate::eval::store::Key;
 use crate::eval::table::Cell;
 use crate::panorama::tonemap::srgb_q98;
@@ -20,7 +20,7 @@ use crate::parallel::parallel;
 use crate::sphere::Equirect;
 
 /// Titles of the columns of [`Quality::cells`].
-pub(super) const COLUMNS: [&str; 8] = [
+pub(super) const COLUMNS: [&str; 9] = [
     "*LDR PSNR (ref.)",
     "*SSIM (ref.)",
     "*LPIPS (ref.)",
@@ -29,12 +29,13 @@ pub(super) const COLUMNS: [&str; 8] = [
     "SSIM (exp.)",
     "LPIPS (exp.)",
     "HDR PSNR (exp.)",
+    "Sun, °",
 ];
 
 /// How the columns are to be read.
 pub(super) const NOTE: &str = "PSNR in dB, mean over panoramas. (ref.): the authors' definition, one factor on log radiance as \
      stored; (exp.): one exposure factor on radiance. LDR is sRGB after division by each image's 98 % quantile; LPIPS \
-     (AlexNet) compares LDR values, lower is better.";
+     (AlexNet) compares LDR values, lower is better. Sun: angle between the brightest lights, over the panoramas that show a sun.";
 
 /// Scores of one definition.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,6 +52,8 @@ pub(super) struct Scored {
 pub(super) struct Quality {
     pub(super) reference: Scored,
     pub(super) exposure: Scored,
+    /// Degrees between the brightest lights; absent where no sun is seen.
+    pub(super) sun: Option<f64>,
 }
 
 /// Reconstructions (log radiance at exposure 0) and scores of all panoramas.
@@ -101,6 +104,7 @@ pub(super) fn rate(grid: Equirect, item: &Item, decoded: &[f32], lpips: Option<&
     Ok(Quality {
         reference: one(&stored(decoded), &stored(&item.log_radiance), Alignment::LogFactor)?,
         exposure: one(decoded, &item.log_radiance, Alignment::Exposure)?,
+        sun: sun_error(grid, decoded, &item.log_radiance),
     })
 }
 
@@ -138,7 +142,12 @@ fn mean(each: &[Quality], part: impl Fn(&Quality) -> Scored) -> Scored {
 impl Quality {
     /// Over panoramas.
     pub(super) fn mean(each: &[Self]) -> Self {
-        Self { reference: mean(each, |q| q.reference), exposure: mean(each, |q| q.exposure) }
+        let suns: Vec<_> = each.iter().filter_map(|q| q.sun).collect();
+        Self {
+            reference: mean(each, |q| q.reference),
+            exposure: mean(each, |q| q.exposure),
+            sun: (!suns.is_empty()).then(|| suns.iter().sum::<f64>() / suns.len() as f64),
+        }
     }
 
     /// One cell per column of [`COLUMNS`].
@@ -147,6 +156,7 @@ impl Quality {
             let lpips = s.lpips.map_or_else(|| Cell::missing("no weights"), |v| Cell::Number(v, 3));
             [Cell::Number(s.ldr_psnr, 2), Cell::Number(s.ssim, 3), lpips, Cell::Number(s.hdr_psnr, 2)]
         };
-        [cells(&self.reference), cells(&self.exposure)].into_iter().flatten().collect()
+        let sun = self.sun.map_or_else(|| Cell::missing("no sun"), |v| Cell::Number(v, 1));
+        [cells(&self.reference), cells(&self.exposure)].into_iter().flatten().chain([sun]).collect()
     }
 }

@@ -58,15 +58,16 @@ pub struct TokenLayer {
     heads: usize,
 }
 
-/// What a layer's attention keeps of one latent; the same for every ray.
+/// What a layer's attention keeps of one latent; the same for every ray. The heads stand side by side, so that all of them
+/// are one matrix product.
 #[derive(Clone, Debug)]
 pub struct Memory {
-    /// Wq Kᵀ/√(h/heads), a query map folded with the keys: [B, heads, h, N].
-    weight: Tensor<4>,
-    /// bq Kᵀ/√(h/heads) [B, heads, 1, N].
-    bias: Tensor<4>,
-    /// V Wout, the values after the output projection: [B, heads, N, h].
-    values: Tensor<4>,
+    /// Wq Kᵀ/√(h/heads), a query map folded with the keys: [B, h, heads·N].
+    weight: Tensor<3>,
+    /// bq Kᵀ/√(h/heads) [B, 1, heads·N].
+    bias: Tensor<3>,
+    /// V Wout, the values after the output projection: [B, heads·N, h].
+    values: Tensor<3>,
 }
 
 impl TokenLayer {
@@ -89,20 +90,27 @@ impl TokenLayer {
             let [rows, _] = x.dims();
             x.reshape([rows, heads, width]).swap_dims(0, 1).unsqueeze::<4>()
         };
+        // [B, heads, rows, N] → [B, rows, heads·N]
+        let side_by_side = |x: Tensor<4>| {
+            let [batch, _, rows, _] = x.dims();
+            x.swap_dims(1, 2).reshape([batch, rows, heads * n])
+        };
         let output = self.out.weight.val().reshape([1, heads, width, hidden]);
         Memory {
-            weight: by_head(self.query.weight.val()).matmul(keys.clone()),
-            bias: by_head(self.query.bias.val().unsqueeze()).matmul(keys),
-            values: split(self.value.forward(tokens)).matmul(output),
+            weight: side_by_side(by_head(self.query.weight.val()).matmul(keys.clone())),
+            bias: side_by_side(by_head(self.query.bias.val().unsqueeze()).matmul(keys)),
+            values: split(self.value.forward(tokens)).matmul(output).reshape([batch, heads * n, hidden]),
         }
     }
 
     /// Features of the rays [B, R, h] → x̂ [B, R, h], whose γ₂ x̂ + β₂ is the layer's output.
     pub(super) fn forward(&self, x: Tensor<3>, memory: Memory) -> Tensor<3> {
-        let logits = x.clone().unsqueeze_dim::<4>(1).matmul(memory.weight) + memory.bias;
+        let logits = x.clone().matmul(memory.weight) + memory.bias;
+        let [batch, rays, all] = logits.dims();
+        let by_head = logits.reshape([batch, rays, self.heads, all / self.heads]);
+        let shares = softmax(by_head, 3).reshape([batch, rays, all]);
         // each head adds its part; together they are out(concatenated heads)
-        let attention = softmax(logits, 3).matmul(memory.values).sum_dim(1).squeeze_dim::<3>(1);
-        let attention = attention + self.out.bias.val().unsqueeze();
+        let attention = shares.matmul(memory.values) + self.out.bias.val().unsqueeze();
         perceptron(x + attention, &self.norm1, &self.ff1, &self.ff2)
     }
 
