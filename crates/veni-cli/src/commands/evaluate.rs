@@ -8,6 +8,8 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
+use veni_core::Error;
+use veni_core::data::{Dataset, Fold};
 use veni_core::eval::codec::Codec;
 use veni_core::eval::lpips::{self, Lpips};
 use veni_core::eval::protocol::{
@@ -19,7 +21,6 @@ use veni_core::eval::table::{Format, Table};
 use veni_core::output::{Overwrite, write_atomic};
 use veni_core::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
-use veni_core::{Error, data::Dataset};
 
 use crate::loading::Loading;
 use crate::output::with_remedy;
@@ -90,6 +91,11 @@ pub(crate) struct Evaluate {
     /// Seed of everything random
     #[arg(long, short, value_name = "S", default_value = "0")]
     seed: u64,
+
+    /// Cross-validation: the I-th of N parts of the panoramas (of train/, where there is one), which 'veni-cli train
+    /// --fold I/N' held back
+    #[arg(long, value_name = "I/N")]
+    fold: Option<Fold>,
 
     /// Only the first so many panoramas by name
     #[arg(long, value_name = "COUNT")]
@@ -186,7 +192,7 @@ impl Evaluate {
             );
         }
         let published = self.published.as_deref().map(Published::load).transpose()?.unwrap_or_default();
-        let files = inputs::panoramas(&self.data, self.images)?;
+        let files = inputs::panoramas(&self.data, self.fold, self.images)?;
         inputs::check_folder(&self.out)?;
         let device = DeviceKind::Flex;
         let subjects = inputs::subjects(&self.models, device)?;

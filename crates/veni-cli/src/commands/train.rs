@@ -12,6 +12,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
+use veni_core::data::Fold;
 use veni_core::model::ModelKind;
 use veni_core::train::config::{DecoderBy, DeviceKind, TrainConfig};
 use veni_core::train::init::Initialised;
@@ -61,6 +62,11 @@ pub(crate) struct Train {
     /// drawn follows from the numbers, or is set by --set data.synthetic_share=0.5
     #[arg(long, value_name = "N")]
     synthetic: Option<usize>,
+
+    /// Cross-validation: hold back the I-th of N parts of the panoramas, and validate by it instead of by val/;
+    /// 'veni-cli evaluate --fold I/N' reports on it
+    #[arg(long, value_name = "I/N")]
+    fold: Option<Fold>,
 
     /// Folder of the run
     #[arg(long, short, value_name = "RUN")]

@@ -7,7 +7,11 @@ pub mod augment;
 pub mod coarsen;
 mod dataset;
 pub mod exposure;
+mod fold;
 pub mod random;
+mod splits;
 
 pub use augment::AugmentConfig;
-pub use dataset::{DataConfig, Dataset, Heard, Item, Splits, panorama_files};
+pub use dataset::{Dataset, Heard, Item, panorama_files};
+pub use fold::Fold;
+pub use splits::{DataConfig, Splits};

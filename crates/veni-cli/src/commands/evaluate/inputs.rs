@@ -3,10 +3,10 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use veni_core::Error;
 use veni_core::baseline::Kind;
-use veni_core::data::panorama_files;
+use veni_core::data::{Fold, panorama_files};
 use veni_core::eval::codec::Basis;
 use veni_core::eval::subject::Subject;
 use veni_core::output::{Overwrite, write_atomic};
@@ -80,15 +80,20 @@ fn named(text: &str) -> Result<(String, Option<PathBuf>)> {
     Ok((name, Some(path)))
 }
 
-/// The panorama files, by name; of a folder with `val/` inside those in it.
-pub(super) fn panoramas(data: &[PathBuf], most: Option<usize>) -> Result<Vec<PathBuf>> {
+/// The panorama files, by name; of a folder with `val/` inside those in it. With a fold, what it holds back of those in
+/// `train/`.
+pub(super) fn panoramas(data: &[PathBuf], fold: Option<Fold>, most: Option<usize>) -> Result<Vec<PathBuf>> {
+    let side = if fold.is_some() { "train" } else { "val" };
     let mut files = Vec::new();
     for folder in data {
-        let val = folder.join("val");
-        files.extend(panorama_files(if val.is_dir() { &val } else { folder })?);
+        let inner = folder.join(side);
+        files.extend(panorama_files(if inner.is_dir() { &inner } else { folder })?);
     }
     files.sort();
     files.dedup();
+    if let Some(fold) = fold.filter(|_| !files.is_empty()) {
+        files = fold.split(&files).context("--fold")?.0;
+    }
     files.truncate(most.unwrap_or(usize::MAX));
     if files.is_empty() {
         let names: Vec<_> = data.iter().map(|d| d.display().to_string()).collect();

@@ -29,6 +29,9 @@ impl Train {
         if !self.data.is_empty() {
             config.data.folders = self.data.clone();
         }
+        if let Some(fold) = self.fold {
+            config.data.fold = Some(fold);
+        }
         if let Some(synthetic) = self.synthetic {
             config.data.synthetic = synthetic;
         }
@@ -73,6 +76,7 @@ impl Train {
             || self.seed.is_some()
             || self.steps.is_some()
             || self.synthetic.is_some()
+            || self.fold.is_some()
             || self.device.is_some()
             || !self.set.is_empty();
         if !described && !changed {
@@ -121,6 +125,9 @@ impl Train {
         let mut words = vec!["veni-cli train".to_owned()];
         for folder in &self.data {
             words.push(format!("--data {}", last(folder)));
+        }
+        if let Some(fold) = self.fold {
+            words.push(format!("--fold {fold}"));
         }
         if let Some(config) = &self.config {
             words.push(format!("--config {}", last(config)));

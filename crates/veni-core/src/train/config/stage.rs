@@ -106,6 +106,12 @@ impl TrainConfig {
         }
         merge(&mut table, &changes, false);
         let mut config: Self = table.try_into().map_err(|e: toml::de::Error| text(&e.message()))?;
+        if let Some(Value::Table(data)) = changes.get("data")
+            && data.contains_key("folders")
+        {
+            // what validates is left out of every stage anyway; a part of other folders would be lost
+            config.data.fold = None;
+        }
         config.set_steps(stage.steps);
         // as if each stage were a run of its own; the first one is the run without stages
         config.seed ^= index.wrapping_mul(0x9E37_79B9_7F4A_7C15);
