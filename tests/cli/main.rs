@@ -15,6 +15,8 @@ mod evaluate;
 mod expand_with;
 #[cfg(feature = "learn")]
 mod fit;
+#[cfg(feature = "learn")]
+mod folds;
 #[cfg(all(feature = "learn", feature = "gpu"))]
 mod gpu;
 #[cfg(feature = "learn")]

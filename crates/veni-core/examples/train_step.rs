@@ -114,7 +114,7 @@ fn record(
     let ([rows, columns], images) = (batch.loss_size, batch.images);
     let Network::Veni(veni) = network else { unreachable!("batches of panoramas are an auto-encoder's") };
     let stripes = veni.stripes()?;
-    let looked = vec![images, batch.stripes, stripes.samples(), 3];
+    let looked = vec![images, stripes.stripes(), stripes.samples(), 3];
     for (name, data, shape) in [
         ("directions", &batch.stripe_directions, looked.clone()),
         ("log_radiance", &batch.stripe_samples, looked),

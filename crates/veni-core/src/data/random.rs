@@ -27,8 +27,6 @@ pub enum Purpose {
     Fit,
     /// Latents that an evaluation draws.
     Evaluation,
-    /// What the encoder is not shown.
-    Hiding,
 }
 
 /// The stream for `purpose` at (`step`, `slot`) of the run with this `seed`.

@@ -1,7 +1,7 @@
 //! What one step works on, prepared on the host while the previous step computes.
 
 use crate::data::coarsen::averaged;
-use crate::data::random::{Purpose, below, normal, permutation, stream, uniform};
+use crate::data::random::{Purpose, below, normal, stream, uniform};
 use crate::data::{AugmentConfig, Dataset};
 use crate::sphere::{Equirect, Stripes};
 use crate::train::config::{LossGrid, TrainConfig};
@@ -14,8 +14,6 @@ pub struct Batch {
     pub step: u64,
     /// B, panoramas.
     pub images: usize,
-    /// T, the stripes of each panorama that the encoder is shown.
-    pub stripes: usize,
     /// Directions of the encoder's samples [B, T, P, 3]; each panorama has its own yaw.
     pub stripe_directions: Vec<f32>,
     /// Log radiance there [B, T, P, 3].
@@ -45,7 +43,6 @@ impl Batch {
             .map(|at| Self {
                 step: self.step,
                 images: self.images / parts,
-                stripes: self.stripes,
                 stripe_directions: part(&self.stripe_directions, at),
                 stripe_samples: part(&self.stripe_samples, at),
                 loss_size: self.loss_size,
@@ -91,11 +88,9 @@ impl<'a> Batches<'a> {
     pub fn prepare(&self, step: u64) -> Batch {
         let grid = self.train.grid();
         let loss = LossView::new(self.loss_grid, grid, &mut stream(self.seed, Purpose::Sampling, step, 0));
-        let shown = self.shown(step);
         let mut batch = Batch {
             step,
             images: self.batch,
-            stripes: shown,
             stripe_directions: Vec::new(),
             stripe_samples: Vec::new(),
             loss_size: loss.size(),
@@ -109,43 +104,18 @@ impl<'a> Batches<'a> {
                 * uniform(&mut stream(self.seed, Purpose::Sampling, step, 1 + slot as u64));
             // the grid is turned, not the image: samples and directions lie at −yaw, in the image's own frame
             let samples = self.stripes.gather_turned(grid, yaw).sample(image.as_chunks().0);
-            let stripes = self.choice_of_stripes(shown, step, slot as u64);
-            let of = |stripe: usize| stripe * self.stripes.samples()..(stripe + 1) * self.stripes.samples();
-            stripes
-                .iter()
-                .for_each(|s| batch.stripe_samples.extend_from_slice(samples[of(*s)].as_flattened()));
+            batch.stripe_samples.extend(samples.into_flattened());
             let (sin, cos) = yaw.sin_cos();
             let turned = |[x, y, z]: &[f32; 3]| {
                 let (x, y) = (f64::from(*x), f64::from(*y));
                 [(cos * x + sin * y) as f32, (cos * y - sin * x) as f32, *z]
             };
-            for stripe in stripes {
-                batch.stripe_directions.extend(self.directions[of(stripe)].iter().flat_map(turned));
-            }
+            batch.stripe_directions.extend(self.directions.iter().flat_map(turned));
             loss.extend_target(&image, &mut batch.target);
             let mut noise = stream(self.seed, Purpose::Noise, step, slot as u64);
             batch.noise.extend((0..3 * self.latent_vectors).map(|_| normal(&mut noise) as f32));
         }
         batch
-    }
-
-    /// How many stripes the encoder is shown in update `step`: the same of all its panoramas, so that they are one tensor.
-    fn shown(&self, step: u64) -> usize {
-        let all = self.stripes.stripes();
-        let hidden = self.augment.hide * uniform(&mut stream(self.seed, Purpose::Hiding, step, 0));
-        (all - (hidden * all as f64).round() as usize).max(1)
-    }
-
-    /// Which ones, in their order.
-    fn choice_of_stripes(&self, shown: usize, step: u64, slot: u64) -> Vec<usize> {
-        let all = self.stripes.stripes();
-        if shown == all {
-            return (0..all).collect();
-        }
-        let mut stripes = permutation(&mut stream(self.seed, Purpose::Hiding, step, 1 + slot), all);
-        stripes.truncate(shown);
-        stripes.sort_unstable();
-        stripes
     }
 
     /// Panorama `index` of the training set as slot `slot` of update `step` sees it.

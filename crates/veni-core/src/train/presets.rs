@@ -163,7 +163,6 @@ fn varied() -> AugmentConfig {
         join_blend: 0.5,
         mix: 0.3,
         mix_share: 0.5,
-        hide: 0.0,
     }
 }
 

@@ -42,8 +42,9 @@ pub fn batch_loss(veni: &Veni, batch: &Batch, loss: &Loss, device: &Device) -> B
 /// # Panics
 /// If the batch was made for another configuration.
 pub fn encode(veni: &Veni, batch: &Batch, device: &Device) -> Posterior {
-    let samples = batch.stripe_samples.len() / (3 * batch.stripes * batch.images);
-    let shape = [batch.images, batch.stripes, samples, 3];
+    let config = &veni.encoder.config;
+    let samples = batch.stripe_samples.len() / (3 * config.stripes * batch.images);
+    let shape = [batch.images, config.stripes, samples, 3];
     let directions = tensor(&batch.stripe_directions, shape, device);
     let radiance = tensor(&batch.stripe_samples, shape, device);
     veni.encoder.forward_per_image(directions, radiance)

@@ -54,14 +54,6 @@ pub struct AugmentConfig {
     pub mix: f64,
     /// Largest share of the second panorama in a mix, in [0, 1].
     pub mix_share: f64,
-    /// Largest share of its stripes, in [0, 1), that the encoder is not shown; the losses see every direction.
-    #[serde(skip_serializing_if = "is_off")]
-    pub hide: f64,
-}
-
-/// An augmentation that is newer than many a configuration: where it is off, those stay as they are.
-fn is_off(strength: &f64) -> bool {
-    *strength == 0.0
 }
 
 impl AugmentConfig {
@@ -84,7 +76,6 @@ impl AugmentConfig {
             ("join_blend", self.join_blend, 1.0),
             ("mix", self.mix, 1.0),
             ("mix_share", self.mix_share, 1.0),
-            ("hide", self.hide, 0.99),
         ];
         for (name, value, most) in fields {
             if !(0.0..=most).contains(&value) {
