@@ -216,10 +216,23 @@ fn larger_models_inside_the_program_go_by_their_size() {
         dir.ok(&["bake", "--model", size, "--seed", "7", "--size", "32", "-o", &sky]);
         let latent = &dir.json(&["inspect", &sky])[0]["latent"];
         assert_eq!(latent["n"].as_u64(), Some(vectors), "{latent}");
-        // it goes back through its own model only
-        dir.ok(&["bake", &sky, "--model", size, "--size", "16", "-o", "again.png", "--force"]);
+        // it goes back through its own model, named or found, and through no other
+        dir.ok(&["bake", &sky, "--model", size, "--size", "16", "-o", "named.exr", "--force"]);
+        dir.ok(&["bake", &sky, "--size", "16", "-o", "found.exr", "--force"]);
+        assert_eq!(
+            std::fs::read(dir.path("named.exr")).unwrap(),
+            std::fs::read(dir.path("found.exr")).unwrap()
+        );
     }
-    dir.refused(&["bake", "300.exr", "-o", "wrong.png"], &["100 vectors", "has 9", "--model 300"]);
+    let wrong = ["bake", "300.exr", "--model", "27", "-o", "wrong.png"];
+    dir.refused(&wrong, &["100 vectors", "has 9", "--model 300"]);
+    let both = ["bake", "27.exr", "300.exr", "--size", "16", "--out-dir", "both"];
+    let run = dir.run(&both);
+    assert!(
+        run.code != Some(0) && run.err.contains("300.exr") && run.err.contains("--model 300"),
+        "{}",
+        run.err
+    );
     dir.refused(&["bake", "--model", "28", "--seed", "1", "-o", "none.png"], &["28", "27, 147, 300"]);
     // a file of that name comes first
     std::fs::copy(model(), dir.path("147")).unwrap();

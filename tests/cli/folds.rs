@@ -44,7 +44,7 @@ fn every_panorama_is_held_back_once_and_trained_on_otherwise() {
 fn parts_that_are_not_there_are_refused() {
     let (dir, data) = (Dir::new(), text(panoramas()));
     let train = train_args(&data, "run", "1");
-    dir.refused(&[&train[..], &["--fold", "1/99"]].concat(), &["1/99", "fewer folds"]);
+    dir.refused(&[&train[..], &["--fold", "99/99"]].concat(), &["99/99", "fewer folds"]);
     dir.refused(&[&train[..], &["--set", "data.fold=second"]].concat(), &["second", "1/4"]);
     let evaluate = ["evaluate", "reconstruction", "--model", model(), "--data", &data, "--out", "eval"];
     dir.refused(&[&evaluate[..], &["--fold", "99/99"]].concat(), &["99/99", "fewer folds"]);

@@ -65,7 +65,7 @@ pub(crate) enum Command {
 #[derive(Args, Debug)]
 pub(crate) struct ModelArgs {
     /// Model file (.safetensors, or a training run's folder), or the size of one inside this program: 27, 147 or 300
-    /// numbers [default: 27]
+    /// numbers [default: the one inside that a latent names, or 27]
     #[arg(long, short, value_name = "FILE|SIZE")]
     pub(crate) model: Option<PathBuf>,
 }

@@ -32,6 +32,18 @@ pub(crate) fn model(args: &ModelArgs) -> Result<Loaded> {
     Ok(Loaded { model: Model::load(&path)?, name: path.display().to_string() })
 }
 
+/// The model of `--model`; where none is named, the one inside the program that the first latent in `files` belongs to.
+pub(crate) fn model_of<'a>(args: &ModelArgs, files: impl IntoIterator<Item = &'a Path>) -> Result<Loaded> {
+    if args.model.is_none() {
+        // what cannot be read is reported when it is its turn
+        let latent = files.into_iter().find_map(|path| stored(path).ok().flatten());
+        if let Some(numbers) = latent.and_then(|latent| inside(&latent)) {
+            return embedded(numbers);
+        }
+    }
+    model(args)
+}
+
 /// Numbers in a latent of the model that is taken where none is named.
 const SMALLEST: usize = 27;
 
@@ -74,22 +86,9 @@ pub(crate) fn seeded(model: &Model, seed: u64) -> Latent {
 /// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder.
 pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
     let model = &loaded.model;
-    let mut latent = match content(path)? {
-        Content::Latent => Latent::load(path)?,
-        Content::Image => {
-            let attributes = panorama::attributes(path)?;
-            match attributes.get(LATENT) {
-                Some(text) => Latent::from_json(text)
-                    .map_err(|e| anyhow!("{}: attribute {LATENT}: {e}", path.display()))?,
-                None if attributes.contains_key(CUBE_FACES) => {
-                    bail!(
-                        "{}: a cube map cannot be encoded; name an equirectangular panorama",
-                        path.display()
-                    )
-                }
-                None => encode(path, loaded, report)?,
-            }
-        }
+    let mut latent = match stored(path)? {
+        Some(latent) => latent,
+        None => encode(path, loaded, report)?,
     };
     check(&latent, loaded).with_context(|| path.display().to_string())?;
     if latent.model.is_none() {
@@ -100,6 +99,23 @@ pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<
         latent.model = Some(model.hash());
     }
     Ok(latent)
+}
+
+/// The latent in a latent's file or in a baked image; None in a panorama without.
+fn stored(path: &Path) -> Result<Option<Latent>> {
+    if is_latent(path)? {
+        return Ok(Some(Latent::load(path)?));
+    }
+    let attributes = panorama::attributes(path)?;
+    match attributes.get(LATENT) {
+        Some(text) => Latent::from_json(text)
+            .map(Some)
+            .map_err(|e| anyhow!("{}: attribute {LATENT}: {e}", path.display())),
+        None if attributes.contains_key(CUBE_FACES) => {
+            bail!("{}: a cube map cannot be encoded; name an equirectangular panorama", path.display())
+        }
+        None => Ok(None),
+    }
 }
 
 /// A latent means something only to the decoder that it was made for.
@@ -117,21 +133,24 @@ fn check(latent: &Latent, Loaded { model, name }: &Loaded) -> Result<()> {
 }
 
 /// The model that a latent belongs to, and how to name it.
-#[cfg(feature = "pretrained")]
 fn owner(latent: &Latent) -> String {
-    let numbers = 3 * latent.vectors.len();
-    match Model::pretrained_of(numbers).filter(|model| Some(model.hash()) == latent.model) {
-        Some(_) => format!("its own model, which is inside this program, with --model {numbers}"),
-        None => OWN.to_owned(),
+    match inside(latent) {
+        Some(numbers) => format!("its own model, which is inside this program, with --model {numbers}"),
+        None => "the latent's own model with --model FILE".to_owned(),
     }
 }
 
-#[cfg(not(feature = "pretrained"))]
-fn owner(_: &Latent) -> String {
-    OWN.to_owned()
+/// The size of the model inside this program that a latent says it belongs to.
+#[cfg(feature = "pretrained")]
+fn inside(latent: &Latent) -> Option<usize> {
+    let numbers = 3 * latent.vectors.len();
+    Model::pretrained_of(numbers).filter(|model| Some(model.hash()) == latent.model).map(|_| numbers)
 }
 
-const OWN: &str = "the latent's own model with --model FILE";
+#[cfg(not(feature = "pretrained"))]
+fn inside(_: &Latent) -> Option<usize> {
+    None
+}
 
 #[cfg(feature = "learn")]
 fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
@@ -162,22 +181,12 @@ pub(crate) fn panorama(path: &Path, report: Report) -> Result<Panorama> {
     Ok(panorama)
 }
 
-enum Content {
-    Latent,
-    Image,
-}
-
-/// Whether a file is a latent, and not an image.
+/// Whether a file is a latent, and not an image: JSON is a latent; everything else is left to the image readers, which say what
+/// they do not read.
 pub(crate) fn is_latent(path: &Path) -> Result<bool> {
-    Ok(matches!(content(path)?, Content::Latent))
-}
-
-/// JSON is a latent; everything else is left to the image readers, which say what they do not read.
-fn content(path: &Path) -> Result<Content> {
     let mut start = Vec::new();
     let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
     file.take(64).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
-    let json = start.trim_ascii_start().starts_with(b"{");
     let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    Ok(if json || named { Content::Latent } else { Content::Image })
+    Ok(named || start.trim_ascii_start().starts_with(b"{"))
 }

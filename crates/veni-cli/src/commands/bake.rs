@@ -142,7 +142,11 @@ impl Bake {
         let overwrite = Overwrite::from(self.force);
         let jobs = skies::jobs(&self.latents, self.seed, &self.target, &self.many, overwrite, report)?;
         let picture = Picture::new(self.layout, self.frame, self.size)?;
-        let loaded = source::model(&self.model)?;
+        let files = jobs.iter().filter_map(|job| match &job.sky {
+            Sky::File(path) => Some(path.as_path()),
+            Sky::Seed(_) => None,
+        });
+        let loaded = source::model_of(&self.model, files)?;
         loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
         let device = Device::open(self.device, &loaded.model, report)?;
         let mut failed = Vec::new();

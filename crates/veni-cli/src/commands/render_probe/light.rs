@@ -21,7 +21,7 @@ pub(super) fn from_file(
     report: Report,
 ) -> Result<Vec<[f32; 3]>> {
     if source::is_latent(path)? {
-        let loaded = source::model(model)?;
+        let loaded = source::model_of(model, [path])?;
         let latent = source::from_file(path, &loaded, report)?;
         return decode(&loaded, &latent, grid, turn);
     }
