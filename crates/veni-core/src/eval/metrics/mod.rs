@@ -14,7 +14,7 @@ pub use correlation::{pearson, ranks, spearman};
 pub use log_error::{log_error, weighted_log_error};
 pub use psnr::psnr;
 pub use ssim::ssim;
-pub use sun::{brightest, sun_error};
+pub use sun::sun_error;
 
 use crate::panorama::tonemap::srgb_q98;
 

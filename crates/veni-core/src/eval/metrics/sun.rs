@@ -1,5 +1,7 @@
 //! Where the light comes from: what decides on which side shadows fall.
 
+use glam::Vec3;
+
 use crate::panorama::luminance;
 use crate::sphere::Equirect;
 
@@ -8,30 +10,7 @@ use crate::sphere::Equirect;
 const VISIBLE: f64 = 6.0;
 
 /// What lies within this angle of the brightest pixel counts to it: the sun and its glow.
-const GLOW: f64 = 10.0;
-
-/// The direction (unit, z up) of the brightest light: the centre of the luminance within 10° of the brightest pixel of an image of
-/// log radiance, `[height, width, 3]`.
-///
-/// # Panics
-/// If the length is not that of the grid.
-pub fn brightest(grid: Equirect, image: &[f32]) -> [f64; 3] {
-    let log_luminance = log_luminance(grid, image);
-    let peak =
-        (0..log_luminance.len()).max_by(|a, b| log_luminance[*a].total_cmp(&log_luminance[*b])).unwrap_or(0);
-    let directions = grid.directions();
-    let towards = directions[peak].map(f64::from);
-    let mut sum = [0.0; 3];
-    for (k, (d, ln)) in directions.iter().zip(&log_luminance).enumerate() {
-        let d = d.map(f64::from);
-        if dot(d, towards) >= GLOW.to_radians().cos() {
-            let weight = (ln - log_luminance[peak]).exp() * grid.solid_angle(k / grid.width);
-            (0..3).for_each(|i| sum[i] += weight * d[i]);
-        }
-    }
-    let length = dot(sum, sum).sqrt();
-    sum.map(|v| v / length)
-}
+const GLOW: f32 = 10.0;
 
 /// The angle in degrees between the brightest lights of two images of log radiance. None if the target shows no sun: where its
 /// largest luminance is less than 400 times its geometric mean, there is no direction to miss.
@@ -39,34 +18,39 @@ pub fn brightest(grid: Equirect, image: &[f32]) -> [f64; 3] {
 /// # Panics
 /// If a length is not that of the grid.
 pub fn sun_error(grid: Equirect, prediction: &[f32], target: &[f32]) -> Option<f64> {
-    let luminance = log_luminance(grid, target);
+    let target = log_luminance(grid, target);
     let (mut mean, mut total) = (0.0, 0.0);
-    for (k, ln) in luminance.iter().enumerate() {
+    for (k, ln) in target.iter().enumerate() {
         let weight = grid.solid_angle(k / grid.width);
         (mean, total) = (mean + weight * ln, total + weight);
     }
-    let largest = luminance.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let largest = target.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     (largest - mean / total >= VISIBLE).then(|| {
-        let (a, b) = (brightest(grid, prediction), brightest(grid, target));
-        let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+        let (a, b) = (brightest(grid, &log_luminance(grid, prediction)), brightest(grid, &target));
         // exact for small angles too, where the cosine is flat
-        dot(cross, cross).sqrt().atan2(dot(a, b)).to_degrees()
+        f64::from(a.cross(b).length().atan2(a.dot(b)).to_degrees())
     })
 }
 
-fn log_luminance(grid: Equirect, image: &[f32]) -> Vec<f64> {
-    assert_eq!(
-        image.len(),
-        3 * grid.width * grid.height,
-        "values of a {} × {} image",
-        grid.width,
-        grid.height
-    );
-    image.as_chunks::<3>().0.iter().map(|rgb| f64::from(luminance(rgb.map(f32::exp))).ln()).collect()
+/// The direction (unit, z up) of the brightest light: the centre of the luminance within 10° of the brightest pixel.
+fn brightest(grid: Equirect, log_luminance: &[f64]) -> Vec3 {
+    let peak =
+        (0..log_luminance.len()).max_by(|a, b| log_luminance[*a].total_cmp(&log_luminance[*b])).unwrap_or(0);
+    let directions = grid.directions();
+    let (towards, near) = (Vec3::from_array(directions[peak]), GLOW.to_radians().cos());
+    let mut sum = Vec3::ZERO;
+    for (k, (direction, ln)) in directions.into_iter().map(Vec3::from_array).zip(log_luminance).enumerate() {
+        if direction.dot(towards) >= near {
+            let weight = (ln - log_luminance[peak]).exp() * grid.solid_angle(k / grid.width);
+            sum += weight as f32 * direction;
+        }
+    }
+    sum.normalize()
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(&b).map(|(a, b)| a * b).sum()
+fn log_luminance(grid: Equirect, image: &[f32]) -> Vec<f64> {
+    assert_eq!(image.len(), 3 * grid.len(), "values of a {} × {} image", grid.width, grid.height);
+    image.as_chunks::<3>().0.iter().map(|rgb| f64::from(luminance(rgb.map(f32::exp))).ln()).collect()
 }
 
 #[cfg(test)]
@@ -88,9 +72,9 @@ mod tests {
     #[test]
     fn the_sun_is_where_it_was_put() {
         for (column, row) in [(5, 20), (127, 31), (64, 2)] {
-            let found = brightest(GRID, &sky(column, row));
-            let put = GRID.direction(column, row).map(f64::from);
-            assert!(dot(found, put) > 0.5_f64.to_radians().cos(), "{found:?} {put:?}");
+            let found = brightest(GRID, &log_luminance(GRID, &sky(column, row)));
+            let put = Vec3::from_array(GRID.direction(column, row));
+            assert!(found.dot(put) > 0.5_f32.to_radians().cos(), "{found:?} {put:?}");
         }
     }
 

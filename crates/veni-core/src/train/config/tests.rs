@@ -74,6 +74,7 @@ fn stage(name: &str, steps: u64, changes: &str) -> StageConfig {
 fn a_stage_is_the_run_with_its_changes() {
     let mut config = Preset::Small.config(9);
     config.data.folders = vec!["real".into()];
+    config.data.fold = Some("2/4".parse().unwrap());
     let rate = config.decoder.learning_rate;
     config.set_steps(500);
     config.stage = vec![
@@ -90,6 +91,8 @@ fn a_stage_is_the_run_with_its_changes() {
     assert_eq!((a.first, a.end(), b.first, b.end()), (0, 300, 300, 500));
     assert_eq!((a.own_data, b.own_data), (true, false));
     assert_eq!((a.config.data.folders[0].to_str(), a.config.data.val_share), (Some("ldr"), 0.0));
+    // of other folders nothing is held back
+    assert_eq!((a.config.data.fold, b.config.data.fold), (None, config.data.fold));
     assert_eq!(b.config.data, config.data);
     assert_eq!(a.config.loss.kld, crate::train::schedule::WeightSchedule::Constant(1.0));
     assert!(matches!(a.config.loss.mage, crate::train::schedule::WeightSchedule::Sigmoid { .. }));

@@ -1,10 +1,14 @@
 //! The systems that the paper's network is compared with.
 
 use super::*;
+use crate::data::random::{Purpose, stream};
 use crate::model::{
     Conditioning, Encoding, Equivariance, Invariance, Model, ModelConfig, ModelInfo, OutputForm,
 };
+use crate::vae::decoder::TokenLayer;
+use crate::vae::decoder::layer::perceptron;
 use crate::vae::veni::model_of;
+use burn::tensor::activation::softmax;
 
 const CONDITIONINGS: [Conditioning; 4] =
     [Conditioning::Attention, Conditioning::Film, Conditioning::Concat, Conditioning::Tokens];
@@ -156,6 +160,42 @@ fn gradients_are_finite_at_latent_zero_everywhere() {
         let gradient = values(&z.grad(&gradients).unwrap());
         assert!(gradient.iter().all(|g| g.is_finite()), "{}", name(&config));
     }
+}
+
+/// The layer's attention as it is written in textbooks: queries, keys and values head by head, then the output map.
+fn plain_attention(layer: &TokenLayer, x: Tensor<3>, tokens: Tensor<3>, heads: usize) -> Tensor<3> {
+    let [batch, _, hidden] = x.dims();
+    let width = hidden / heads;
+    let [q, k, v] =
+        [layer.query.forward(x.clone()), layer.key.forward(tokens.clone()), layer.value.forward(tokens)];
+    let of = |y: &Tensor<3>, head: usize| {
+        y.clone().slice([0..batch, 0..y.dims()[1], head * width..(head + 1) * width])
+    };
+    let each = (0..heads).map(|head| {
+        let scores = of(&q, head).matmul(of(&k, head).swap_dims(1, 2)) / (width as f64).sqrt();
+        softmax(scores, 2).matmul(of(&v, head))
+    });
+    layer.out.forward(Tensor::cat(each.collect(), 2))
+}
+
+#[test]
+fn folded_attention_over_tokens_is_attention() {
+    let device = Device::flex();
+    let mut rng = stream(5, Purpose::Weights, 0, 0);
+    let layer = TokenLayer::new(16, 4, &mut rng, &device);
+    let wave = |rows: usize, pitch: f32| {
+        let values: Vec<f32> = (0..2 * rows * 16).map(|i| (pitch * i as f32).sin()).collect();
+        Tensor::<3>::from_data(TensorData::new(values, [2, rows, 16]), &device)
+    };
+    let (x, tokens) = (wave(3, 0.37), wave(5, 0.53));
+    let folded = layer.forward(x.clone(), layer.remember(tokens.clone()));
+    let written = |heads| {
+        let attention = plain_attention(&layer, x.clone(), tokens.clone(), heads);
+        perceptron(x.clone() + attention, &layer.norm1, &layer.ff1, &layer.ff2)
+    };
+    assert!(largest_difference(&folded, &written(4)) < 1e-5);
+    // it would tell heads that were mixed up
+    assert!(largest_difference(&folded, &written(2)) > 1e-3);
 }
 
 #[test]
