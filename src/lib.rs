@@ -2,6 +2,8 @@
 //!
 //! This package re-exports [`veni_core`] and, with the feature `gpu`, `veni_gpu`.
 
+#![forbid(unsafe_code)]
+
 pub use veni_core::*;
 
 #[cfg(feature = "gpu")]

@@ -8,7 +8,6 @@ fn args<'a>(data: &'a str, out: &'a str, device: &'a str) -> Vec<&'a str> {
 }
 
 /// A line of a run's `config.toml`.
-#[cfg(feature = "wgpu")]
 fn configured(dir: &Dir, run: &str, key: &str) -> String {
     let config = std::fs::read_to_string(dir.path(run).join("config.toml")).unwrap();
     let line = config.lines().find_map(|line| line.strip_prefix(key)?.trim().strip_prefix("= "));
@@ -25,6 +24,35 @@ fn a_device_that_is_missing_names_the_remedy() {
     if cfg!(not(feature = "wgpu")) {
         dir.refused(&args(&data, "run", "wgpu"), &["device wgpu", "not compiled in", "--features wgpu"]);
     }
+}
+
+/// Mixed precision trains and resumes where the processor has it, and is refused in one line, with nothing left behind,
+/// where it does not.
+#[test]
+fn mixed_precision_trains_where_the_processor_has_it() {
+    let dir = Dir::new();
+    let data = text(panoramas());
+    let mixed = |out| [args(&data, out, "flex"), vec!["--mixed-precision"]].concat();
+    let run = dir.run(&mixed("run"));
+    if std::fs::read_to_string("/proc/cpuinfo").is_ok_and(|cpu| cpu.contains("avx512_bf16")) {
+        assert_eq!((run.code, run.err.as_str()), (Some(0), ""), "{run:?}");
+        assert_eq!(configured(&dir, "run", "decoder_by"), "kernels-bfloat16");
+        let again = dir.run(&[mixed("run"), vec!["--resume"]].concat());
+        assert_eq!(again.code, Some(0), "{again:?}");
+        // the stored command begins the same run
+        let said = dir.ok(&["inspect", "run/model.safetensors", "--json"]);
+        assert!(said.contains("--mixed-precision"), "{said}");
+    } else {
+        assert_eq!((run.code, run.out.as_str(), run.err.lines().count()), (Some(2), "", 1), "{run:?}");
+        assert!(run.err.contains("kernels-bfloat16") && run.err.contains("decoder_by = kernels"), "{run:?}");
+        assert!(dir.files().is_empty(), "{:?}", dir.files());
+    }
+    let run = dir.run(&[args(&data, "other", "wgpu"), vec!["--mixed-precision"]].concat());
+    assert!(run.code == Some(2) && run.err.contains("--mixed-precision"), "{run:?}");
+    let tokens = ["--set", "model.decoder.conditioning=tokens"];
+    let run = dir.run(&[mixed("other"), tokens.to_vec()].concat());
+    assert!(run.code == Some(2) && run.err.contains("decoder_by = tensors"), "{run:?}");
+    assert!(!dir.path("other").exists());
 }
 
 /// A Vulkan loader that finds no driver stands in for a machine without a graphics device.

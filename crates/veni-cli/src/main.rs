@@ -3,6 +3,8 @@
 //! One file per command in [`commands`]; what they share is beside this file. Results go to stdout,
 //! everything else to stderr; exit codes are 0 (fine), 1 (ran, negative outcome), 2 (error).
 
+#![forbid(unsafe_code)]
+
 #[cfg(feature = "learn")]
 mod allocator;
 mod args;

@@ -45,6 +45,7 @@ fn main() -> Result<()> {
 
     let splits = Splits::open(&config.data, config.seed)?;
     let device = config.device.device()?.autodiff();
+    config.decoder_by.check()?;
     let start_bytes = status_bytes("VmRSS");
     let mut network = Network::new(&config, splits.train.len(), &device)?;
     let parameters: usize = weights::read(&network, "").values().map(|w| w.data.len()).sum();

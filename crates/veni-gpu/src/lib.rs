@@ -11,6 +11,8 @@
 //!
 //! This crate belongs to the lighting world: it must not depend on burn (checked by `scripts/check-worlds.sh`).
 
+#![forbid(unsafe_code)]
+
 pub mod shader;
 
 #[cfg(feature = "wgpu")]

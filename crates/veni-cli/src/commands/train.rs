@@ -122,6 +122,11 @@ pub(crate) struct Train {
     #[arg(long, value_enum)]
     device: Option<TrainDevice>,
 
+    /// Multiply the decoder's matrices in bfloat16, sums and all else in f32 (decoder_by = kernels-bfloat16): faster on
+    /// processors with AVX512-BF16, an error on others
+    #[arg(long)]
+    mixed_precision: bool,
+
     /// Continue the run in RUN; other settings, if given, must be its own
     #[arg(long, conflicts_with = "force")]
     resume: bool,
@@ -303,7 +308,7 @@ fn note_device(config: &TrainConfig, report: Report) -> Result<()> {
     if opened.software {
         report.note(format_args!("{} is a software adapter; --device flex is faster", opened.name));
     }
-    if config.decoder_by == DecoderBy::Kernels {
+    if config.decoder_by.is_kernels() {
         report.note("decoder_by = kernels: the decoder is computed by the processor, not on the device");
     }
     Ok(())

@@ -164,6 +164,9 @@ pub(super) fn product<S: Simd, const ADD: bool, const RELU: bool>(
     let x = &x[..weight.inputs];
     let (bias, _) = bias.as_chunks::<PANEL>();
     let (y, _) = y.as_chunks_mut::<PANEL>();
+    if let Some(pairs) = &weight.pairs {
+        return pairs.product::<ADD, RELU>(bias, bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
+    }
     for ((panel, bias), y) in weight.panels().zip(bias).zip(y) {
         // 24 sums and 3 inputs, or 12 sums, 3 inputs and a weight, fill the registers
         if S::REGISTER_COUNT >= 32 {

@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use super::aligned::Aligned;
+use super::bfloat16::{Bfloat16, Pairs};
 use super::gradient::Transposed;
 
 /// Outputs per panel: what one register tile computes.
@@ -16,6 +17,8 @@ const CHUNK: usize = 24;
 pub(super) struct Matrix {
     pub(super) inputs: usize,
     data: Aligned,
+    /// The same in bfloat16, where products are computed so.
+    pub(super) pairs: Option<Pairs>,
 }
 
 impl Matrix {
@@ -29,7 +32,7 @@ impl Matrix {
                 packed[..values.len()].copy_from_slice(values);
             }
         }
-        Self { inputs, data }
+        Self { inputs, data, pairs: None }
     }
 
     /// Of a row-major matrix [in, out].
@@ -37,12 +40,21 @@ impl Matrix {
         Self::pack(data.len() / outputs, outputs, |k| &data[k * outputs..][..outputs])
     }
 
-    /// The transpose of the first `outputs` columns.
+    /// The same, to be multiplied in bfloat16.
+    fn round(&mut self, token: Bfloat16) {
+        self.pairs = Some(Pairs::new(token, self.inputs, self.rows()));
+    }
+
+    /// The transpose of the first `outputs` columns, multiplied as this one is.
     pub(super) fn transposed(&self, outputs: usize) -> Self {
         let at = |k: usize, o: usize| self.rows()[o / PANEL * self.inputs + k][o % PANEL];
         let rows: Vec<Vec<f32>> =
             (0..outputs).map(|o| (0..self.inputs).map(|k| at(k, o)).collect()).collect();
-        Self::pack(outputs, self.inputs, |o| &rows[o])
+        let mut transpose = Self::pack(outputs, self.inputs, |o| &rows[o]);
+        if let Some(pairs) = &self.pairs {
+            transpose.round(pairs.token());
+        }
+        transpose
     }
 
     /// Panels of `inputs` rows each.
@@ -85,6 +97,8 @@ pub(super) struct Mlp {
     pub(super) layers: Vec<Layer>,
     pub(super) output: Matrix,
     pub(super) output_bias: Vec<f32>,
+    /// Whether matrices but for the output's are multiplied in bfloat16, and the sums that are gradients by them added so.
+    pub(super) bfloat16: Option<Bfloat16>,
     /// Made when the first gradient is asked for.
     transposed: OnceLock<Transposed>,
 }
@@ -115,8 +129,17 @@ impl Mlp {
             layers: (0..layers).map(layer).collect(),
             output: Matrix::new(tensor("output.weight"), 3),
             output_bias: padded("output.bias"),
+            bfloat16: None,
             transposed: OnceLock::new(),
         }
+    }
+
+    /// The same, with matrices but for the output's multiplied in bfloat16.
+    #[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "only training computes so"))]
+    pub(super) fn in_bfloat16(mut self, token: Bfloat16) -> Self {
+        let maps = self.layers.iter_mut().flat_map(|layer| [&mut layer.ff1, &mut layer.ff2]);
+        self.input.iter_mut().map(|chunk| &mut chunk.weight).chain(maps).for_each(|m| m.round(token));
+        Self { bfloat16: Some(token), transposed: OnceLock::new(), ..self }
     }
 
     /// The matrices the other way round.

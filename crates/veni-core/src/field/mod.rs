@@ -13,6 +13,7 @@
 
 mod aligned;
 mod bake;
+pub(crate) mod bfloat16;
 mod block;
 mod condition;
 pub(crate) mod gradient;

@@ -154,3 +154,40 @@ fn a_device_that_computes_something_else_is_caught() {
         assert!(found[at] > 3.0, "{name}: {found:?}");
     }
 }
+
+/// Mixed precision moves losses by less than a hundredth, and the gradient by the decoder's weights too; and it does move
+/// them, so that it was at work. Elsewhere the step is refused before it begins.
+#[test]
+fn bfloat16_computes_nearly_the_same_step() {
+    let by = DecoderBy::KernelsBfloat16;
+    if let Err(error) = by.check() {
+        say(&format!("bfloat16 skipped: {error}"));
+        assert!(error.to_string().contains("take decoder_by = kernels"), "{error}");
+        return;
+    }
+    for config in [Preset::Tiny.config(3), Preset::Tiny.auto_decoder(3)] {
+        let expected = step_on(DeviceKind::Flex, DecoderBy::Kernels, &config, None);
+        let found = step_on(DeviceKind::Flex, by, &config, None);
+        for (name, value) in &expected.parts {
+            let apart = (value - found.parts[name]).abs() / value.abs();
+            assert!(apart < 1e-2, "{name}: {value}, in bfloat16 {}", found.parts[name]);
+        }
+        let apart = |decoder: bool| {
+            let parts = expected.gradients.iter().filter(|(name, _)| name.starts_with("decoder.") == decoder);
+            let [own, moved] = parts.fold([0.0; 2], |sums, (name, gradient)| {
+                let pairs = gradient.data.iter().zip(&found.gradients[name].data);
+                pairs
+                    .map(|(x, y)| (f64::from(*x), f64::from(*y)))
+                    .fold(sums, |[own, moved], (x, y)| [own + x * x, moved + (x - y) * (x - y)])
+            });
+            (moved / own).sqrt()
+        };
+        // the latent's is a sum over directions in which most of what the decoder's are made of cancels
+        let (decoder, others) = (apart(true), apart(false));
+        say(&format!("{:?} in bfloat16: gradients move by {decoder:.4} and {others:.4}", config.model.kind));
+        assert!(
+            (1e-4..0.03).contains(&decoder) && others < 0.15,
+            "{decoder} {others} of the gradients' lengths"
+        );
+    }
+}

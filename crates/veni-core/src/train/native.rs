@@ -7,35 +7,52 @@
 use burn::tensor::{Device, Gradients, Tensor};
 
 use crate::train::batch::Batch;
+use crate::train::config::DecoderBy;
 use crate::train::loss::{Loss, LossTerms, Term};
 use crate::train::network::{Network, Prepared};
 use crate::train::rays::RayBatch;
 use crate::train::step::{encode, tensor};
-use crate::vae::{Reni, Veni};
+use crate::vae::{Decoder, Native, Reni, Veni};
 
 /// The weighted losses and the gradients of their sum.
 ///
 /// # Panics
-/// If the batch or `loss` was made for another configuration, or for the other system, or the decoder does not fold.
+/// If the batch or `loss` was made for another configuration, or for the other system, or the decoder does not fold, or
+/// this machine does not compute as `by` says.
 pub(super) fn gradients(
     network: &Network,
     batch: &Prepared,
     loss: &Loss,
+    by: DecoderBy,
     device: &Device,
 ) -> (LossTerms, Gradients) {
+    let prepare = |decoder: &Decoder, latent| {
+        let native = decoder.native(latent).expect("a network that folds");
+        if by == DecoderBy::KernelsBfloat16 {
+            native.in_bfloat16().expect("checked by the run")
+        } else {
+            native
+        }
+    };
     match (network, batch) {
-        (Network::Veni(veni), Prepared::Panoramas(batch)) => of_panoramas(veni, batch, loss, device),
-        (Network::Reni(reni), Prepared::Rays(batch)) => of_rays(reni, batch, loss, device),
+        (Network::Veni(veni), Prepared::Panoramas(batch)) => of_panoramas(veni, batch, loss, prepare, device),
+        (Network::Reni(reni), Prepared::Rays(batch)) => of_rays(reni, batch, loss, prepare, device),
         _ => panic!("a batch of the other system"),
     }
 }
 
-fn of_panoramas(veni: &Veni, batch: &Batch, loss: &Loss, device: &Device) -> (LossTerms, Gradients) {
+fn of_panoramas(
+    veni: &Veni,
+    batch: &Batch,
+    loss: &Loss,
+    prepare: impl Fn(&Decoder, Tensor<3>) -> Native,
+    device: &Device,
+) -> (LossTerms, Gradients) {
     let step = batch.step - 1;
     let posterior = encode(veni, batch, device);
     let latent = posterior.sample(tensor(&batch.noise, [batch.images, veni.latent_vectors(), 3], device));
     let kld = posterior.log_variance.and_then(|l| loss.kld(step, posterior.mean, l));
-    let decoder = veni.decoder.native(latent).expect("a network that folds");
+    let decoder = prepare(&veni.decoder, latent);
     let directions = batch.loss_directions.as_chunks().0;
     let decoded = decoder.forward(directions, directions.len());
     let [rows, columns] = batch.loss_size;
@@ -45,12 +62,18 @@ fn of_panoramas(veni: &Veni, batch: &Batch, loss: &Loss, device: &Device) -> (Lo
     finish(terms, kld, back)
 }
 
-fn of_rays(reni: &Reni, batch: &RayBatch, loss: &Loss, device: &Device) -> (LossTerms, Gradients) {
+fn of_rays(
+    reni: &Reni,
+    batch: &RayBatch,
+    loss: &Loss,
+    prepare: impl Fn(&Decoder, Tensor<3>) -> Native,
+    device: &Device,
+) -> (LossTerms, Gradients) {
     let (images, rays, n) = (batch.panoramas.len(), batch.rays, reni.decoder.latent_vectors());
     let step = batch.step - 1;
     let rows = reni.latents.rows(&batch.panoramas);
     let latent = rows.sample(tensor(&batch.noise, [images, n, 3], device));
-    let decoder = reni.decoder.native(latent).expect("a network that folds");
+    let decoder = prepare(&reni.decoder, latent);
     let directions = batch.directions.as_chunks().0;
     let mut decoded = decoder.forward(directions, rays);
     if let Some(scale) = &rows.scale {

@@ -98,7 +98,7 @@ impl Network {
     /// The weighted losses of a batch and the gradients of their sum.
     ///
     /// # Panics
-    /// As [`Network::terms`].
+    /// As [`Network::terms`], and where [`DecoderBy::check`] refuses `by`.
     pub fn gradients(
         &self,
         batch: &Prepared,
@@ -106,8 +106,8 @@ impl Network {
         by: DecoderBy,
         device: &Device,
     ) -> (LossTerms, Gradients) {
-        if by == DecoderBy::Kernels && self.decoder().config().check_folds().is_ok() {
-            return native::gradients(self, batch, loss, device);
+        if by.is_kernels() && self.decoder().config().check_folds().is_ok() {
+            return native::gradients(self, batch, loss, by, device);
         }
         let terms = self.terms(batch, loss, device);
         let gradients = terms.total().backward();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, anyhow, bail};
 use veni_core::Error;
 use veni_core::model::Model;
-use veni_core::train::config::TrainConfig;
+use veni_core::train::config::{DecoderBy, TrainConfig};
 use veni_core::train::init::InitConfig;
 use veni_core::train::presets::Preset;
 
@@ -40,6 +40,15 @@ impl Train {
         }
         if let Some(device) = self.device {
             config.set_device(device.into());
+        }
+        if self.mixed_precision {
+            if !config.device.decoder_by().is_kernels() {
+                bail!(
+                    "--mixed-precision: the decoder is computed by tensor operations on this device; it is for --device \
+                     flex and ndarray"
+                );
+            }
+            config.decoder_by = DecoderBy::KernelsBfloat16;
         }
         if let Some(steps) = self.steps {
             config = config.with_overrides(&[format!("steps={steps}")])?;
@@ -78,6 +87,7 @@ impl Train {
             || self.synthetic.is_some()
             || self.fold.is_some()
             || self.device.is_some()
+            || self.mixed_precision
             || !self.set.is_empty();
         if !described && !changed {
             return Ok(());
@@ -153,6 +163,7 @@ impl Train {
             ("--synthetic", self.synthetic.map(|n| n as u64)),
         ];
         words.extend(numbers.into_iter().filter_map(|(name, n)| Some(format!("{name} {}", n?))));
+        words.extend(self.mixed_precision.then(|| "--mixed-precision".to_owned()));
         words.extend(self.set.iter().map(|set| format!("--set {}", shell_word(Path::new(set)))));
         words.push(format!("--out {}", last(&self.out)));
         words.join(" ")

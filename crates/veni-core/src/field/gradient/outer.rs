@@ -7,6 +7,7 @@
 
 use pulp::Simd;
 
+use crate::field::bfloat16::Bfloat16;
 use crate::field::block::{Row, VECTORS};
 
 /// Vectors of outputs per panel.
@@ -25,8 +26,41 @@ pub(super) fn lanes<S: Simd>() -> usize {
     VECTORS * S::F32_LANES
 }
 
-/// The rows of a block's gradient into `out`, panel by panel, in each direction by direction. What `out` holds beyond
-/// the last row stays.
+/// A block's gradient, turned round.
+pub(super) struct Outer<'a, S: Simd> {
+    turned: &'a [Wide<S>],
+    bfloat16: Option<Bfloat16>,
+}
+
+impl<'a, S: Simd> Outer<'a, S> {
+    /// The rows of a gradient into `room`, panel by panel, in each direction by direction. What `room` holds beyond the
+    /// last row stays.
+    #[inline(always)]
+    pub(super) fn new(bfloat16: Option<Bfloat16>, rows: &[Row<S>], room: &'a mut [Wide<S>]) -> Self {
+        match bfloat16 {
+            None => turn_round::<S>(rows, room),
+            Some(token) => token.turn_round(bytemuck::cast_slice(rows), bytemuck::cast_slice_mut(room)),
+        }
+        Self { turned: room, bfloat16 }
+    }
+
+    /// Adds x gᵀ of a block to `sums`, which lie panel by panel, in each input by input.
+    #[inline(always)]
+    pub(super) fn add(&self, simd: S, x: &[Row<S>], sums: &mut [Wide<S>]) {
+        match self.bfloat16 {
+            None => add(simd, x, self.turned, sums),
+            Some(token) => {
+                let [x, turned] = [x.as_flattened(), self.turned.as_flattened()];
+                token.add(
+                    bytemuck::cast_slice(x),
+                    bytemuck::cast_slice(turned),
+                    bytemuck::cast_slice_mut(sums),
+                );
+            }
+        }
+    }
+}
+
 #[inline(always)]
 pub(super) fn turn_round<S: Simd>(rows: &[Row<S>], out: &mut [Wide<S>]) {
     let (lanes, wide) = (lanes::<S>(), WIDE * S::F32_LANES);
@@ -41,7 +75,6 @@ pub(super) fn turn_round<S: Simd>(rows: &[Row<S>], out: &mut [Wide<S>]) {
     }
 }
 
-/// Adds x gᵀ of a block to `sums`, which lie panel by panel, in each input by input.
 #[inline(always)]
 pub(super) fn add<S: Simd>(simd: S, x: &[Row<S>], gradient: &[Wide<S>], sums: &mut [Wide<S>]) {
     let lanes = lanes::<S>();

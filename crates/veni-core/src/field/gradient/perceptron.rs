@@ -14,6 +14,7 @@ use super::backward::{Backward, Sums};
 use super::weight_sums::{WeightSums, layout};
 use crate::field::Folded;
 use crate::field::aligned::Aligned;
+use crate::field::bfloat16::Bfloat16;
 use crate::field::block::Blocks;
 use crate::field::mlp::Mlp;
 
@@ -56,6 +57,11 @@ impl Perceptron {
     /// From named tensors, row-major: `input.weight`, `layers.{l}.norm1.gamma`, …, `output.bias`.
     pub(crate) fn new<'a>(hidden: usize, layers: usize, tensor: impl Fn(&str) -> &'a [f32]) -> Self {
         Self { mlp: Mlp::new(hidden, layers, tensor) }
+    }
+
+    /// The same, with matrices but for the output's multiplied in bfloat16.
+    pub(crate) fn in_bfloat16(self, token: Bfloat16) -> Self {
+        Self { mlp: self.mlp.in_bfloat16(token) }
     }
 
     /// N vectors [x, y, z], and for the first layer and after each layer what is added there, h numbers each.

@@ -3,6 +3,7 @@
 use pulp::Simd;
 
 use super::outer::{self, Wide};
+use crate::field::bfloat16::Bfloat16;
 use crate::field::block::Row;
 use crate::field::mlp::{Mlp, PANEL, stored_row};
 
@@ -44,6 +45,7 @@ impl WeightSums {
 pub(super) struct WeightRoom<'a, S: Simd> {
     /// A block's gradient by the outputs of a matrix, direction by direction.
     turned: &'a mut [Wide<S>],
+    bfloat16: Option<Bfloat16>,
     /// One per chunk of directional inputs.
     pub(super) input: Vec<&'a mut [Wide<S>]>,
     pub(super) layers: Vec<LayerRoom<'a, S>>,
@@ -92,17 +94,17 @@ impl<'a, S: Simd> WeightRoom<'a, S> {
         });
         let layers = layers.collect();
         let (output, output_bias) = (take(&mut rest, 3 * h), take(&mut rest, 3));
-        Self { turned, input, layers, output, output_bias }
+        Self { turned, bfloat16: mlp.bfloat16, input, layers, output, output_bias }
     }
 
     /// x gᵀ for the directional inputs; every chunk's features fill whole panels of `encodings`.
     #[inline(always)]
     pub(super) fn add_input(&mut self, simd: S, mlp: &Mlp, encodings: &[Row<S>], gradient: &[Row<S>]) {
-        outer::turn_round::<S>(gradient, self.turned);
+        let outer = outer::Outer::new(self.bfloat16, gradient, self.turned);
         let mut from = 0;
         for (chunk, sums) in mlp.input.iter().zip(&mut self.input) {
             let inputs = chunk.weight.inputs;
-            outer::add(simd, &encodings[from..from + inputs], self.turned, sums);
+            outer.add(simd, &encodings[from..from + inputs], sums);
             from += inputs.next_multiple_of(PANEL);
         }
     }
@@ -110,15 +112,15 @@ impl<'a, S: Simd> WeightRoom<'a, S> {
     /// x gᵀ for the first feed-forward map of layer `l`.
     #[inline(always)]
     pub(super) fn add_ff1(&mut self, simd: S, l: usize, x: &[Row<S>], gradient: &[Row<S>]) {
-        outer::turn_round::<S>(gradient, self.turned);
-        outer::add(simd, x, self.turned, self.layers[l].ff1);
+        let outer = outer::Outer::new(self.bfloat16, gradient, self.turned);
+        outer.add(simd, x, self.layers[l].ff1);
     }
 
     /// x gᵀ for the second.
     #[inline(always)]
     pub(super) fn add_ff2(&mut self, simd: S, l: usize, x: &[Row<S>], gradient: &[Row<S>]) {
-        outer::turn_round::<S>(gradient, self.turned);
-        outer::add(simd, x, self.turned, self.layers[l].ff2);
+        let outer = outer::Outer::new(self.bfloat16, gradient, self.turned);
+        outer.add(simd, x, self.layers[l].ff2);
     }
 
     /// Adds what was summed to `sums`.

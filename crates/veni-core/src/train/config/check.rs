@@ -1,6 +1,6 @@
 //! What types cannot say about a configuration.
 
-use super::{LossGrid, TrainConfig};
+use super::{DecoderBy, LossGrid, TrainConfig};
 use crate::data::AugmentConfig;
 use crate::model::ModelKind;
 use crate::{Error, Result};
@@ -29,6 +29,14 @@ impl TrainConfig {
                 "accumulate = {}: must divide batch = {}, and be positive",
                 self.accumulate, self.batch
             )));
+        }
+        if self.decoder_by == DecoderBy::KernelsBfloat16 {
+            self.model.decoder.check_folds().map_err(|_| {
+                Error::invalid(
+                    "decoder_by = kernels-bfloat16: kernels compute the paper's decoder only (attention, vn, so2); take \
+                     decoder_by = tensors",
+                )
+            })?;
         }
         if !(0.0..1.0).contains(&self.ema_decay) {
             return Err(Error::invalid(format!("ema_decay = {}: must lie in 0..1", self.ema_decay)));

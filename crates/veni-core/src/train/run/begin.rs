@@ -107,6 +107,7 @@ impl Trainer {
         heard: Heard<'_>,
     ) -> Result<Self> {
         let device = config.device.device()?.autodiff();
+        config.decoder_by.check()?;
         let splits = Splits::open_heard(&config.data, config.seed, heard)?;
         let running = |stage: Stage| -> Result<Running> {
             let loss = Network::loss(&stage.config, &device);

@@ -11,8 +11,9 @@ use std::collections::BTreeMap;
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::{Decoder, Layers, invariants};
-use crate::Result;
+use crate::field::bfloat16::Bfloat16;
 use crate::field::gradient::perceptron::{Image, Perceptron};
+use crate::{Error, Result};
 
 /// A decoder with the latents of a batch, on the processor.
 #[derive(Debug)]
@@ -90,6 +91,24 @@ impl Decoder {
 }
 
 impl Native {
+    /// The same in mixed precision: factors of the matrix products but for the output's are rounded to bfloat16, sums and
+    /// all else stay in f32.
+    ///
+    /// # Errors
+    /// As [`Native::check_bfloat16`].
+    pub fn in_bfloat16(self) -> Result<Self> {
+        let token = Bfloat16::detect().ok_or_else(no_bfloat16)?;
+        Ok(Self { perceptron: self.perceptron.in_bfloat16(token), ..self })
+    }
+
+    /// Whether this processor multiplies in bfloat16.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where it does not.
+    pub fn check_bfloat16() -> Result<()> {
+        Bfloat16::detect().map(|_| ()).ok_or_else(no_bfloat16)
+    }
+
     /// Log radiance `[B, R, 3]`, flat, in the same R directions for every image or in each image's own.
     ///
     /// # Panics
@@ -135,6 +154,13 @@ impl Native {
             _ => panic!("{count} directions are neither {rays} nor {rays} for each of {images} images"),
         }
     }
+}
+
+fn no_bfloat16() -> Error {
+    Error::unsupported(
+        "decoder_by = kernels-bfloat16: this processor multiplies no bfloat16 (it lacks AVX512-BF16); take \
+         decoder_by = kernels",
+    )
 }
 
 fn values<const D: usize>(tensor: &Tensor<D>) -> Vec<f32> {

@@ -21,7 +21,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Result;
 
-/// What computes the decoder and its gradients in training: the same numbers up to rounding.
+/// What computes the decoder and its gradients in training: the same numbers up to rounding, which
+/// [`DecoderBy::KernelsBfloat16`] does more coarsely.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DecoderBy {
@@ -31,6 +32,25 @@ pub enum DecoderBy {
     Kernels,
     /// Tensor operations on the device.
     Tensors,
+    /// The kernels with mixed precision: factors of the matrix products rounded to bfloat16 (eight significant bits),
+    /// sums and all else in f32. Only processors with AVX512-BF16 have it.
+    KernelsBfloat16,
+}
+
+impl DecoderBy {
+    /// Whether this machine computes so.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`](crate::Error::Unsupported) where products in bfloat16 are wanted and the processor has
+    /// none.
+    pub fn check(self) -> Result<()> {
+        if self == Self::KernelsBfloat16 { crate::vae::Native::check_bfloat16() } else { Ok(()) }
+    }
+
+    /// Whether it is one of the two that compute by kernels, on the processor.
+    pub fn is_kernels(self) -> bool {
+        self != Self::Tensors
+    }
 }
 
 /// Where gradients are computed.
