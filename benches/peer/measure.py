@@ -20,6 +20,8 @@ HERE = Path(__file__).resolve().parent
 DATA = HERE.parents[1] / "assets" / "panoramas"
 CASES = ["paper:9", "paper:100", "small:9"]
 PROGRAMS = ("ours", "authors", "folded")
+# With --mixed instead of the authors' graph, each program in f32 and with products in bfloat16
+MIXED = ("ours", "ours-mixed", "folded", "folded-mixed")
 # What our losses and VN-ReLUs are called in the authors' form
 REFERENCE = [
     "loss.form=reference", "loss.level=0.0", "model.encoder.vn_relu=reference", "model.decoder.vn_relu=reference",
@@ -33,16 +35,18 @@ SAME = ("preset", "latent_vectors", "panoramas", "directions", "parameters")
 
 
 def command(program, preset, latent_vectors, options, record=None):
-    if program == "ours":
-        extra = (["--record", record] if record else []) + (REFERENCE if options.form == "reference" else [])
+    if program.startswith("ours"):
+        mixed = ["decoder_by=kernels-bfloat16"] if program == "ours-mixed" else []
+        extra = (["--record", record] if record else []) + mixed + (REFERENCE if options.form == "reference" else [])
         return [options.veni, str(DATA), preset, latent_vectors, str(options.steps), *extra]
-    script = [sys.executable, str(HERE / "train_step.py"), program, preset, latent_vectors, str(options.steps)]
+    graph, _, mixed = program.partition("-")
+    script = [sys.executable, str(HERE / "train_step.py"), *(["--mixed"] if mixed else []), graph, preset, latent_vectors, str(options.steps)]
     return [*script, "--threads", str(options.threads), "--form", options.form]
 
 
 def environment(program, options):
     threads = {name: str(options.threads) for name in ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")}
-    tuned = {} if options.allocator != "tuned" else KEEP if program == "ours" else ALLOCATOR
+    tuned = {} if options.allocator != "tuned" else KEEP if program.startswith("ours") else ALLOCATOR
     return {**os.environ, **threads, **tuned}
 
 
@@ -67,11 +71,11 @@ def measure(case, options):
     pairs = []
     for pair in range(options.pairs):
         found = {}
-        for program in PROGRAMS:
+        for program in options.programs:
             found[program] = said = run(program, preset, latent_vectors, options)
             print(f"{case} pair {pair + 1}: {program} {said['step_seconds']:.3f} s", file=sys.stderr, flush=True)
         for key in SAME:
-            values = {program: found[program][key] for program in PROGRAMS}
+            values = {program: found[program][key] for program in options.programs}
             if len({str(v) for v in values.values()}) > 1:
                 raise SystemExit(f"{case}: the programs do not do the same: {key} is {values}")
         pairs.append(found)
@@ -85,19 +89,20 @@ def spread(values):
 def summary(case, pairs):
     any_pair = pairs[0]["ours"]
     found = {"case": case, **{key: any_pair[key] for key in SAME}, "programs": {}, "ratios": {}}
-    for program in PROGRAMS:
+    for program in pairs[0]:
         runs = [pair[program] for pair in pairs]
         found["programs"][program] = {
             "step_seconds": spread([r["step_seconds"] for r in runs]),
             "peak_bytes": spread([r["peak_bytes"] for r in runs]),
             "start_bytes": spread([r["start_bytes"] for r in runs]),
         }
-    for program in PROGRAMS[1:]:
+    for program in list(pairs[0])[1:]:
         found["ratios"][program] = spread([p[program]["step_seconds"] / p["ours"]["step_seconds"] for p in pairs])
     return found
 
 
 NAMES = {"ours": "veni", "authors": "PyTorch, the authors' graph", "folded": "PyTorch, folded graph"}
+NAMES |= {"ours-mixed": "veni, bfloat16 in the decoder", "folded-mixed": "PyTorch, folded graph, autocast to bfloat16"}
 
 
 def markdown(summaries, options, version):
@@ -154,10 +159,15 @@ def main():
         "--allocator", choices=("tuned", "plain"), default="tuned",
         help="PyTorch's memory: glibc told to keep large blocks (quicker), or as it is",
     )
+    parser.add_argument(
+        "--mixed", action="store_true",
+        help="each program in f32 and with products in bfloat16 (processors with AVX512-BF16), without the authors' graph",
+    )
     parser.add_argument("--json", action="store_true", help="print everything as JSON instead of tables")
     parser.add_argument("--check", action="store_true", help="compare numbers instead of times; exit code 1 if they differ")
     parser.add_argument("--veni-cli", metavar="BINARY", help="with --check: compare with what it bakes, too")
     options = parser.parse_args()
+    options.programs = MIXED if options.mixed else PROGRAMS
     if options.check:
         options.steps = 1
         sys.exit(0 if checked(options) else 1)

@@ -1,4 +1,4 @@
-"""What is trained: the sizes of the presets `tiny`, `small` and `paper` (crates/veni-core/src/train/presets.rs)."""
+"""What is trained: the sizes of the presets `tiny`, `small` and `paper` (crates/veni-core/src/train/presets/auto_encoder.rs)."""
 
 from dataclasses import dataclass, field, replace
 

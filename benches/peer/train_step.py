@@ -1,6 +1,6 @@
 """Times training steps of one of the graphs in PyTorch and prints one line of JSON, as the example `train_step` does.
 
-    python benches/peer/train_step.py authors|folded PRESET LATENT_VECTORS STEPS [--threads T] [--form F] [--seed S]
+    python benches/peer/train_step.py authors|folded PRESET LATENT_VECTORS STEPS [--threads T] [--form F] [--seed S] [--mixed]
 """
 
 import argparse
@@ -24,6 +24,7 @@ def main():
     parser.add_argument("steps", type=int, help="steps that are timed, after one that is not")
     parser.add_argument("--threads", type=int, default=torch.get_num_threads())
     parser.add_argument("--form", choices=("corrected", "reference"), default="corrected")
+    parser.add_argument("--mixed", action="store_true", help="encoder and decoder under autocast to bfloat16")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     torch.set_num_threads(arguments.threads)
@@ -36,7 +37,7 @@ def main():
     parameters = sum(w.numel() for w in ours.values())
     del ours
     batches = [training.draw_batch(sizes, step) for step in range(1 + arguments.steps)]
-    loss, optimiser = training.Loss(sizes), training.Optimiser(graph, sizes)
+    loss, optimiser = training.Loss(sizes, mixed=arguments.mixed), training.Optimiser(graph, sizes)
     seconds, values = [], []
     for batch in batches:
         start = time.perf_counter()

@@ -47,14 +47,17 @@ def panorama_directions(rows, columns, kind=torch.float32):
 class Loss:
     """The weighted losses of a batch by name."""
 
-    def __init__(self, sizes, kind=torch.float32):
-        self.weight = sizes.losses["kld"]
+    def __init__(self, sizes, kind=torch.float32, mixed=False):
+        self.weight, self.mixed = sizes.losses["kld"], mixed
         self.image = losses.FORMS[sizes.form](sizes, kind)
 
     def __call__(self, graph, batch):
-        mean, log_variance = graph.encode(batch.directions, batch.log_radiance)
-        latent = mean + (0.5 * log_variance).exp() * batch.noise
-        decoded = graph.decode(latent, batch.loss_directions).reshape(batch.target.shape)
+        with torch.autocast("cpu", dtype=torch.bfloat16, enabled=self.mixed):
+            mean, log_variance = graph.encode(batch.directions, batch.log_radiance)
+            latent = mean + (0.5 * log_variance).exp() * batch.noise
+            decoded = graph.decode(latent, batch.loss_directions).reshape(batch.target.shape)
+        if self.mixed:
+            mean, log_variance, decoded = mean.float(), log_variance.float(), decoded.float()
         return {**self.image(decoded, batch.target), "kld": self.weight * losses.kld(mean, log_variance)}
 
 

@@ -297,5 +297,4 @@ struct Record<'a> {
 }
 
 #[cfg(test)]
-#[path = "run_tests.rs"]
 mod tests;
