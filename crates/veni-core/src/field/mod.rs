@@ -13,6 +13,10 @@
 
 mod aligned;
 mod bake;
+#[cfg_attr(
+    not(all(target_arch = "x86_64", feature = "learn")),
+    allow(dead_code, reason = "without kernels nothing reads what they are given")
+)]
 pub(crate) mod bfloat16;
 mod block;
 mod condition;
