@@ -67,7 +67,7 @@ fn every_preset_and_objective_runs_and_seeds_name_starts() {
         assert!(loss.is_finite() && loss > 0.0, "{args:?}");
         loss
     };
-    for preset in ["thorough", "display", "reference", "reni++"] {
+    for preset in ["energy", "thorough", "display", "reference", "reni++"] {
         loss(&["--preset", preset]);
     }
     for objective in ["log", "absolute", "display", "reference", "cosine-scale", "training"] {

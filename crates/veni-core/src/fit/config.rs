@@ -48,6 +48,8 @@ pub enum Method {
     Auto,
 }
 
+/// [`Objective::Energy`]'s share by default: docs/RESULTS.md, Where the light comes from.
+const SHARE: f64 = 0.05;
 /// Most latent vectors that [`Method::Auto`] fits without exploring.
 const FEW: usize = 16;
 /// Updates of Levenberg–Marquardt after exploring.
@@ -73,7 +75,7 @@ pub struct Plateau {
 /// The part of the loss that looks at the image. P is the prediction, I the image, both log radiance; ω is a
 /// pixel's area (solid angle), m its mask.
 ///
-/// The first four look at each pixel alone: then a step costs one pass forward and one backward, fused. The
+/// The first five look at each pixel alone: then a step costs one pass forward and one backward, fused. The
 /// others need the whole image before they know any pixel's gradient: one more pass forward.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -91,6 +93,13 @@ pub enum Objective {
         /// Weight of the log error, which keeps what the display clips in place.
         log: f64,
     },
+    /// Σ ω m v (P − I)²/Σ ω m with v = 1 − `share` + `share` · L/L̄, L being a pixel's luminance and L̄ its mean over
+    /// ω m: a pixel counts by its area and by the share of the light that comes from it. For light that shall fall
+    /// on something: a sun is a thousandth of the sphere and half of its light.
+    Energy {
+        /// Part of the weight that is dealt out by light, in [0, 1].
+        share: f64,
+    },
     /// mean((m P − m I)²) over all pixels alike: the authors' helper.
     ReferenceLogError,
     /// 1 − mean cos(P, I) + mean(R²) − mean(R)², R = P − I, over all pixels of all images alike (RENI++);
@@ -101,7 +110,8 @@ pub enum Objective {
 }
 
 impl FitConfig {
-    /// From any start to convergence with solid-angle weights: for evaluation and for use.
+    /// From any start to convergence with solid-angle weights: for evaluation, where systems are compared under one
+    /// objective.
     pub fn thorough() -> Self {
         Self {
             steps: 400,
@@ -118,6 +128,11 @@ impl FitConfig {
     /// As [`FitConfig::thorough`], for what a screen shows under the image's own white.
     pub fn display() -> Self {
         Self { objective: Objective::Display { log: 0.01 }, ..Self::thorough() }
+    }
+
+    /// As [`FitConfig::thorough`], with an eye to where the light comes from: for use.
+    pub fn energy() -> Self {
+        Self { objective: Objective::Energy { share: SHARE }, ..Self::thorough() }
     }
 
     /// For the light on a surface ([`fit_shaded`](super::fit_shaded)), whose loss is no sum over the light's pixels.
@@ -195,6 +210,11 @@ impl FitConfig {
         }
         if let Some(plateau) = self.plateau {
             numbers.push(("plateau.improvement", plateau.improvement, true));
+        }
+        if let Objective::Energy { share } = self.objective
+            && !(0.0..=1.0).contains(&share)
+        {
+            return Err(Error::invalid(format!("objective.energy.share = {share}: must lie in 0..=1")));
         }
         if let Objective::Display { log } = self.objective {
             numbers.push(("objective.display.log", log, true));

@@ -2,7 +2,7 @@
 
 use super::config::Objective;
 use super::target::FitTarget;
-use crate::panorama::tonemap;
+use crate::panorama::{luminance, tonemap};
 
 /// Where the absolute error turns from a parabola into a line, in log radiance.
 const ROUNDING: f64 = 0.1;
@@ -46,6 +46,10 @@ impl<'a> PixelLoss<'a> {
                 let total: f64 = areas.iter().enumerate().map(|(p, area)| area * counts(p)).sum();
                 areas.iter().enumerate().map(|(p, area)| area * counts(p) / total).collect()
             }
+        };
+        let weights = match objective {
+            Objective::Energy { share } => by_light(image, weights, share),
+            _ => weights,
         };
         let (white, shown) = match objective {
             Objective::Display { .. } => {
@@ -92,6 +96,18 @@ impl<'a> PixelLoss<'a> {
         }
         out
     }
+}
+
+/// Weights with `share` of their sum dealt out by the light that comes from each pixel.
+fn by_light(image: &[f32], weights: Vec<f64>, share: f64) -> Vec<f64> {
+    let luminance = |rgb: &[f32]| f64::from(luminance([0, 1, 2].map(|c| rgb[c].exp())));
+    // what is unknown may be anything
+    let light =
+        image.chunks_exact(3).zip(&weights).map(|(rgb, w)| if *w > 0.0 { w * luminance(rgb) } else { 0.0 });
+    let light: Vec<f64> = light.collect();
+    let (sum, total) = (weights.iter().sum::<f64>(), light.iter().sum::<f64>());
+    let scale = if total > 0.0 { share * sum / total } else { 0.0 };
+    weights.iter().zip(light).map(|(w, light)| (1.0 - share) * w + scale * light).collect()
 }
 
 /// The log of the 98 % quantile of an image's known values.

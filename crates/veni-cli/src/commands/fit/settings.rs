@@ -73,8 +73,11 @@ pub(super) struct Settings {
 /// Named settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Preset {
-    /// Log radiance, weighted by solid angle, as far down as it goes
+    /// Log radiance, weighted by solid angle and a little (5 %) by the light that comes from there: suns stand where they
+    /// belong
     #[default]
+    Energy,
+    /// Log radiance, weighted by solid angle alone: what 'evaluate' compares systems by
     Thorough,
     /// What is seen on a screen under the picture's own white; highlights beyond it are left alone
     Display,
@@ -94,6 +97,8 @@ enum ObjectiveName {
     Absolute,
     /// Squared error of tonemapped values
     Display,
+    /// Squared error of log radiance, by solid angle and (5 %) by the light that comes from there
+    Energy,
     /// Squared error of log radiance, every pixel alike
     Reference,
     /// RENI++'s: cosine and scale-invariant error
@@ -137,11 +142,12 @@ impl Settings {
     /// `light`: for the light on a surface, not for a picture of it.
     pub(super) fn config(&self, light: bool) -> Result<FitConfig> {
         let mut config = match self.preset {
-            Preset::Thorough | Preset::Display if light => {
+            Preset::Thorough | Preset::Display | Preset::Energy if light => {
                 FitConfig { plateau: Some(PLATEAU), ..FitConfig::light() }
             }
             Preset::Thorough => FitConfig { plateau: Some(PLATEAU), ..FitConfig::thorough() },
             Preset::Display => FitConfig { plateau: Some(PLATEAU), ..FitConfig::display() },
+            Preset::Energy => FitConfig { plateau: Some(PLATEAU), ..FitConfig::energy() },
             Preset::Reference => FitConfig::reference_helper(1e-2, 2e-3, 2000),
             Preset::Renipp => FitConfig::reni_evaluation(),
         };
@@ -173,6 +179,7 @@ impl Settings {
                 ObjectiveName::Log => Objective::LogError,
                 ObjectiveName::Absolute => Objective::LogAbsolute,
                 ObjectiveName::Display => FitConfig::display().objective,
+                ObjectiveName::Energy => FitConfig::energy().objective,
                 ObjectiveName::Reference => Objective::ReferenceLogError,
                 ObjectiveName::CosineScale => Objective::CosineScaleInvariant,
                 ObjectiveName::Training => Objective::Terms(LossConfig::default()),
@@ -191,7 +198,7 @@ impl Settings {
     /// What depends on whether part of the sphere is unknown.
     pub(super) fn adapted(&self, config: FitConfig, partial: bool) -> FitConfig {
         let prior = match (self.prior, self.preset) {
-            (None, Preset::Thorough | Preset::Display) if partial => PRIOR,
+            (None, Preset::Thorough | Preset::Display | Preset::Energy) if partial => PRIOR,
             _ => config.prior,
         };
         let free_exposure = self.exposure.map_or(partial, |e| e == Exposure::Free);
@@ -201,7 +208,7 @@ impl Settings {
     /// For the light on a surface, whose loss is a robust one of log radiance.
     pub(super) fn for_light(&self, config: FitConfig) -> FitConfig {
         let prior = match (self.prior, self.preset) {
-            (None, Preset::Thorough | Preset::Display) => LIGHT_PRIOR,
+            (None, Preset::Thorough | Preset::Display | Preset::Energy) => LIGHT_PRIOR,
             _ => config.prior,
         };
         let free_exposure = self.exposure.is_none_or(|e| e == Exposure::Free);

@@ -13,11 +13,9 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 mod combine;
-mod lobes;
 mod warp;
 
 pub use combine::{join, mix, recombine};
-pub use lobes::{Lobe, add_sun};
 pub use warp::{azimuth_warp, mirror, polar_warp, turn_columns};
 
 use crate::data::exposure::centre_exposure;
@@ -56,10 +54,6 @@ pub struct AugmentConfig {
     pub mix: f64,
     /// Largest share of the second panorama in a mix, in [0, 1].
     pub mix_share: f64,
-    /// Deviation of the amplitudes of eight spherical Gaussians added to log radiance.
-    pub lobes: f64,
-    /// Probability of a sun where the panorama has none.
-    pub sun: f64,
 }
 
 impl AugmentConfig {
@@ -82,8 +76,6 @@ impl AugmentConfig {
             ("join_blend", self.join_blend, 1.0),
             ("mix", self.mix, 1.0),
             ("mix_share", self.mix_share, 1.0),
-            ("lobes", self.lobes, 5.0),
-            ("sun", self.sun, 1.0),
         ];
         for (name, value, most) in fields {
             if !(0.0..=most).contains(&value) {
@@ -131,14 +123,6 @@ impl AugmentConfig {
         if self.azimuth_warp > 0.0 {
             let bearing = std::f64::consts::TAU * uniform(rng);
             out = azimuth_warp(grid, &out, self.azimuth_warp * signed(rng), bearing);
-            touched = true;
-        }
-        if self.lobes > 0.0 {
-            (0..8).for_each(|_| Lobe::random(self.lobes, rng).add(grid, &mut out));
-            touched = true;
-        }
-        if happens(rng, self.sun) {
-            add_sun(grid, &mut out, rng);
             touched = true;
         }
         if self.contrast > 0.0 {
@@ -217,8 +201,6 @@ mod tests {
             join_blend: 0.5,
             mix: 0.7,
             mix_share: 0.5,
-            lobes: 0.3,
-            sun: 0.5,
         }
     }
 

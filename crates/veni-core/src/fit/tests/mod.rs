@@ -86,11 +86,12 @@ pub(super) fn model(decoder: &Decoder) -> Model {
     model_of(weights::read(decoder, "decoder."), &config, ModelInfo::default()).unwrap()
 }
 
-fn objectives() -> [Objective; 6] {
+fn objectives() -> [Objective; 7] {
     [
         Objective::LogError,
         Objective::LogAbsolute,
         Objective::Display { log: 0.01 },
+        Objective::Energy { share: 0.4 },
         Objective::ReferenceLogError,
         Objective::CosineScaleInvariant,
         Objective::Terms(LossConfig { mage_scales: 1, ..LossConfig::default() }),
@@ -124,6 +125,32 @@ fn the_fast_way_and_the_graph_go_the_same_way() {
     }
 }
 
+/// One pixel with half of the light gets its area's part of 1 − share and half of the share; what a mask hides gets nothing,
+/// whatever stands there.
+#[test]
+fn light_deals_out_its_share_of_the_weight() {
+    let grid = Equirect::new(4, 2);
+    let mut image = vec![0.0; 24];
+    // eight pixels of one area, one of them hidden: six of radiance 1, and one of 6
+    image[3..6].fill(6.0f32.ln());
+    image[9..12].fill(f32::INFINITY);
+    let mask: Vec<f32> = (0..8).map(|p| f32::from(p != 3)).collect();
+    let (images, masks) = ([image.as_slice()], [mask.as_slice()]);
+    let target = FitTarget { masks: Some(&masks), ..FitTarget::panoramas(grid, &images) };
+    let loss = |share: f64, which: &dyn Fn(usize) -> bool| -> f64 {
+        let loss = PixelLoss::new(Objective::Energy { share }, &target, 0, &target.areas()).unwrap();
+        let off = |p: usize| [0, 1, 2].map(|c| f64::from(image[3 * p + c]) + 1.0);
+        (0..8).filter(|p| which(*p)).map(|p| loss.at(p, off(p)).loss).sum()
+    };
+    for share in [0.0, 0.3, 1.0] {
+        assert!((loss(share, &|_| true) - 1.0).abs() < 1e-6, "an error of 1 everywhere is 1");
+        let expected = (1.0 - share) / 7.0 + 0.5 * share;
+        let found = loss(share, &|p| p == 1);
+        assert!((found - expected).abs() < 1e-6, "{share}: {found} instead of {expected}");
+        assert_eq!(loss(share, &|p| p == 3), 0.0);
+    }
+}
+
 #[test]
 fn slopes_are_those_of_the_pixel_losses() {
     let grid = Equirect::new(4, 2);
@@ -131,7 +158,7 @@ fn slopes_are_those_of_the_pixel_losses() {
     let clipped: Vec<bool> = (0..24).map(|k| k % 3 == 0).collect();
     let (images, clips) = ([image.as_slice()], [clipped.as_slice()]);
     let target = FitTarget { clipped: Some(&clips), ..FitTarget::panoramas(grid, &images) };
-    for objective in &objectives()[..4] {
+    for objective in &objectives()[..5] {
         let loss = PixelLoss::new(*objective, &target, 0, &target.areas()).unwrap();
         for pixel in 0..8 {
             let p = [0, 1, 2].map(|c| (1.3 * (3 * pixel + c) as f64).cos());
@@ -153,7 +180,9 @@ fn slopes_are_those_of_the_pixel_losses() {
                 for over in [-1.0, -0.1, 0.1, 1.0].map(|d| parabola(d) - moved(d)) {
                     match objective {
                         Objective::LogAbsolute => assert!(over > -1e-9, "{pixel}, {c}: {over}"),
-                        Objective::LogError => assert!(over.abs() < 1e-9, "{pixel}, {c}: {over}"),
+                        Objective::LogError | Objective::Energy { .. } => {
+                            assert!(over.abs() < 1e-9, "{pixel}, {c}: {over}");
+                        }
                         _ => {}
                     }
                 }
@@ -230,9 +259,11 @@ fn settings_that_make_no_sense_are_refused_by_name() {
     };
     let light = FitConfig::light();
     assert!(message(&whole, FitConfig { prior: -1.0, ..light }).contains("prior = -1"));
+    let objective = Objective::Energy { share: 1.5 };
+    assert!(message(&whole, FitConfig { objective, ..light }).contains("share = 1.5"));
     let mask = vec![1.0; grid.len()];
     let masked = FitTarget { masks: Some(&[&mask]), ..whole.clone() };
-    for objective in &objectives()[4..] {
+    for objective in &objectives()[5..] {
         let message = message(&masked, FitConfig { objective: *objective, ..light });
         assert!(message.contains("takes no masks"), "{message}");
     }

@@ -25,8 +25,6 @@ fn varied() -> AugmentConfig {
         join_blend: 0.5,
         mix: 0.3,
         mix_share: 0.5,
-        lobes: 0.0,
-        sun: 0.0,
     }
 }
 
