@@ -93,11 +93,12 @@ pub enum Objective {
         /// Weight of the log error, which keeps what the display clips in place.
         log: f64,
     },
-    /// Σ ω m v (P − I)²/Σ ω m with v = 1 − `share` + `share` · L/L̄, L being a pixel's luminance and L̄ its mean over
-    /// ω m: a pixel counts by its area and by the share of the light that comes from it. For light that shall fall
-    /// on something: a sun is a thousandth of the sphere and half of its light.
+    /// (1 − `share`) · [`Objective::LogError`] + `share` · Σ ω m (L/L̄) ρ(P − I)/Σ ω m, L being a pixel's luminance, L̄ its
+    /// mean over ω m, and ρ(e) = 2 (√(1 + e²) − 1): a pixel counts by its area and a little by the light that comes from
+    /// it, where ρ (e² for small e, a line for large ones) keeps a sun that the decoder cannot follow from dragging the
+    /// rest along. For light that shall fall on something: a sun is a thousandth of the sphere and half of its light.
     Energy {
-        /// Part of the weight that is dealt out by light, in [0, 1].
+        /// Part of the weight that goes by light, in [0, 1].
         share: f64,
     },
     /// mean((m P − m I)²) over all pixels alike: the authors' helper.

@@ -7,6 +7,9 @@ use crate::panorama::{luminance, tonemap};
 /// Where the absolute error turns from a parabola into a line, in log radiance.
 const ROUNDING: f64 = 0.1;
 
+/// Where the part of [`Objective::Energy`] that goes by light turns from a parabola into a line, in log radiance.
+const REACH: f64 = 1.0;
+
 /// A pixel's part of a loss around a prediction, channel by channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PixelValue {
@@ -24,6 +27,8 @@ pub(super) struct PixelLoss<'a> {
     clipped: Option<&'a [bool]>,
     /// Per pixel; 0 where nothing is known.
     weights: Vec<f64>,
+    /// Per pixel, what the light that comes from there adds to its weight; if that counts.
+    light: Vec<f64>,
     /// Log of the white point.
     white: f64,
     /// The image as shown, if that is compared.
@@ -47,9 +52,9 @@ impl<'a> PixelLoss<'a> {
                 areas.iter().enumerate().map(|(p, area)| area * counts(p) / total).collect()
             }
         };
-        let weights = match objective {
+        let (weights, light) = match objective {
             Objective::Energy { share } => by_light(image, weights, share),
-            _ => weights,
+            _ => (weights, Vec::new()),
         };
         let (white, shown) = match objective {
             Objective::Display { .. } => {
@@ -58,13 +63,13 @@ impl<'a> PixelLoss<'a> {
             }
             _ => (0.0, Vec::new()),
         };
-        Some(Self { objective, image, clipped: target.clipped.map(|c| c[b]), weights, white, shown })
+        Some(Self { objective, image, clipped: target.clipped.map(|c| c[b]), weights, light, white, shown })
     }
 
     /// The pixel's part of the loss for log radiance `prediction`.
     pub(super) fn at(&self, pixel: usize, prediction: [f64; 3]) -> PixelValue {
-        // the mean over the channels
-        let weight = self.weights[pixel] / 3.0;
+        let area = self.weights[pixel];
+        let weight = area + self.light.get(pixel).copied().unwrap_or(0.0);
         let mut out = PixelValue::default();
         if weight == 0.0 {
             return out;
@@ -88,18 +93,26 @@ impl<'a> PixelLoss<'a> {
                     let slope = 2.0 * difference * by + 2.0 * log * error;
                     (difference * difference + log * error * error, slope, 2.0 * by * by + 2.0 * log)
                 }
+                Objective::Energy { .. } => {
+                    // e² where it is small, a line where it is not: see `Objective::Energy`
+                    let (root, light) = ((error / REACH).hypot(1.0), self.light[pixel]);
+                    let value = area * error * error + light * 2.0 * REACH * REACH * (root - 1.0);
+                    let by = area + light / root;
+                    (value / weight, 2.0 * error * by / weight, 2.0 * by / weight)
+                }
                 _ => (error * error, 2.0 * error, 2.0),
             };
-            out.loss += weight * value;
-            out.slope[c] = weight * slope;
-            out.curvature[c] = weight * curvature;
+            // the mean over the channels
+            out.loss += weight / 3.0 * value;
+            out.slope[c] = weight / 3.0 * slope;
+            out.curvature[c] = weight / 3.0 * curvature;
         }
         out
     }
 }
 
-/// Weights with `share` of their sum dealt out by the light that comes from each pixel.
-fn by_light(image: &[f32], weights: Vec<f64>, share: f64) -> Vec<f64> {
+/// What is left of the weights, and `share` of their sum dealt out by the light that comes from each pixel.
+fn by_light(image: &[f32], weights: Vec<f64>, share: f64) -> (Vec<f64>, Vec<f64>) {
     let luminance = |rgb: &[f32]| f64::from(luminance([0, 1, 2].map(|c| rgb[c].exp())));
     // what is unknown may be anything
     let light =
@@ -107,7 +120,8 @@ fn by_light(image: &[f32], weights: Vec<f64>, share: f64) -> Vec<f64> {
     let light: Vec<f64> = light.collect();
     let (sum, total) = (weights.iter().sum::<f64>(), light.iter().sum::<f64>());
     let scale = if total > 0.0 { share * sum / total } else { 0.0 };
-    weights.iter().zip(light).map(|(w, light)| (1.0 - share) * w + scale * light).collect()
+    let rest = weights.into_iter().map(|w| (1.0 - share) * w).collect();
+    (rest, light.into_iter().map(|light| scale * light).collect())
 }
 
 /// The log of the 98 % quantile of an image's known values.

@@ -73,12 +73,12 @@ pub(super) struct Settings {
 /// Named settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Preset {
-    /// Log radiance, weighted by solid angle and a little (5 %) by the light that comes from there: suns stand where they
-    /// belong
+    /// Log radiance, weighted by solid angle, as far down as it goes
     #[default]
-    Energy,
-    /// Log radiance, weighted by solid angle alone: what 'evaluate' compares systems by
     Thorough,
+    /// The same, weighted a little (5 %) by the light that comes from there: the sun stands where it belongs, for light
+    /// that shall fall on something
+    Energy,
     /// What is seen on a screen under the picture's own white; highlights beyond it are left alone
     Display,
     /// The article's helper: 2000 steps from 1e-2 to 2e-3, unweighted, without a prior
