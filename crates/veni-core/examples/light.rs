@@ -1,9 +1,10 @@
 //! What a fit that weighs pixels by their light gains, and what it costs:
-//! `cargo run --release -p veni-core --example light -- MODEL FOLDER [SHARE …]`.
+//! `cargo run --release -p veni-core --example light -- MODEL FOLDER FACTOR [SHARE …]`.
 //!
-//! Each panorama of FOLDER is fitted at 64 × 32 from the encoder's latent, once per share of the weight that is dealt out by
-//! light (`Objective::Energy`; 0 is the plain squared error of log radiance), and looked at at 128 × 64. Irradiance is
-//! that of surfaces facing 26 ways; its error is √⟨(ln E − ln E_true)²⟩ over the ways, without any alignment.
+//! Each panorama of FOLDER, at 128 × 64, is fitted on means of FACTOR × FACTOR pixels (1, 2 or 4) from the encoder's latent
+//! with the model's own prior, once per share of the weight that goes by light (`Objective::Energy`; 0 is the plain squared
+//! error of log radiance). Irradiance is that of surfaces facing 26 ways; its error is √⟨(ln E − ln E_true)²⟩ over the ways,
+//! without any alignment.
 
 #![allow(clippy::print_stdout, reason = "a program for a terminal")]
 
@@ -23,13 +24,16 @@ use veni_core::vae::Veni;
 use veni_core::{Error, Result};
 
 const GRID: Equirect = Equirect { width: 128, height: 64 };
-const FACTOR: usize = 2;
 
 fn main() -> Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
-    let usage =
-        || Error::invalid("usage: light MODEL FOLDER [SHARE …], shares in 0..=1 [0 0.05 0.1 0.2 0.4]");
-    let [model, folder, shares @ ..] = arguments.as_slice() else { return Err(usage()) };
+    let usage = || {
+        Error::invalid(
+            "usage: light MODEL FOLDER FACTOR [SHARE …], FACTOR 1, 2 or 4, shares in 0..=1 [0 0.05 0.1 0.2 0.4]",
+        )
+    };
+    let [model, folder, factor, shares @ ..] = arguments.as_slice() else { return Err(usage()) };
+    let factor = factor.parse().ok().filter(|f| [1, 2, 4].contains(f)).ok_or_else(usage)?;
     let mut shares: Vec<f64> =
         shares.iter().map(|s| s.parse().map_err(|_| usage())).collect::<Result<_>>()?;
     if shares.is_empty() {
@@ -43,7 +47,7 @@ fn main() -> Result<()> {
         let all = set
             .items()
             .iter()
-            .map(|item| look(&model, &item.log_radiance, share))
+            .map(|item| look(&model, &item.log_radiance, factor, share))
             .collect::<Result<Vec<_>>>()?;
         let mean = |f: &dyn Fn(&Look) -> f64| all.iter().map(f).sum::<f64>() / all.len() as f64;
         let suns: Vec<_> = all.iter().filter_map(|look| look.sun).collect();
@@ -67,14 +71,14 @@ struct Look {
     irradiance: f64,
 }
 
-fn look(model: &Model, image: &[f32], share: f64) -> Result<Look> {
+fn look(model: &Model, image: &[f32], factor: usize, share: f64) -> Result<Look> {
     let veni = Veni::from_model(model, &Device::flex())?;
     let start: Vec<_> = veni.encode(GRID, &[image])?.into_iter().map(|e| Latent::new(e.vectors)).collect();
     let (decoder, prior) = (model.decoder()?, model.prior());
-    let coarse = averaged(GRID, image, FACTOR);
+    let coarse = averaged(GRID, image, factor);
     let images = [coarse.as_slice()];
     let target =
-        FitTarget { prior: Some(&prior), ..FitTarget::panoramas(coarse_grid(GRID, FACTOR), &images) };
+        FitTarget { prior: Some(&prior), ..FitTarget::panoramas(coarse_grid(GRID, factor), &images) };
     let objective = if share > 0.0 { Objective::Energy { share } } else { Objective::LogError };
     let config = FitConfig { objective, ..FitConfig::thorough() };
     let found = fit(FitDecoder::from(&decoder), &target, &start, &config)?;
