@@ -31,7 +31,7 @@ impl Decoder {
     /// Prepares the kernels for latents `[B, N, 3]`. They compute in f32, on the processor, whatever the device.
     ///
     /// # Errors
-    /// [`Error::Unsupported`](crate::Error::Unsupported) if the network does not fold per latent
+    /// [`Error::Unsupported`] if the network does not fold per latent
     /// ([`check_folds`](crate::model::DecoderConfig::check_folds)).
     ///
     /// # Panics
