@@ -49,6 +49,8 @@ fn mixed_precision_trains_where_the_processor_has_it() {
     }
     let run = dir.run(&[args(&data, "other", "wgpu"), vec!["--mixed-precision"]].concat());
     assert!(run.code == Some(2) && run.err.contains("--mixed-precision"), "{run:?}");
+    let run = dir.run(&[mixed("other"), vec!["--set", "decoder_by=tensors"]].concat());
+    assert!(run.code == Some(2) && run.err.contains("a --set takes it back"), "{run:?}");
     let tokens = ["--set", "model.decoder.conditioning=tokens"];
     let run = dir.run(&[mixed("other"), tokens.to_vec()].concat());
     assert!(run.code == Some(2) && run.err.contains("decoder_by = tensors"), "{run:?}");

@@ -66,6 +66,9 @@ impl Train {
             );
         }
         let config = config.with_overrides(&self.set).context("--set")?;
+        if self.mixed_precision && config.decoder_by != DecoderBy::KernelsBfloat16 {
+            bail!("--mixed-precision: a --set takes it back; leave one of them out");
+        }
         config.check()?;
         Ok(config)
     }
