@@ -97,8 +97,6 @@ pub(super) struct Mlp {
     pub(super) layers: Vec<Layer>,
     pub(super) output: Matrix,
     pub(super) output_bias: Vec<f32>,
-    /// Whether matrices but for the output's are multiplied in bfloat16, and the sums that are gradients by them added so.
-    pub(super) bfloat16: Option<Bfloat16>,
     /// Made when the first gradient is asked for.
     transposed: OnceLock<Transposed>,
 }
@@ -129,7 +127,6 @@ impl Mlp {
             layers: (0..layers).map(layer).collect(),
             output: Matrix::new(tensor("output.weight"), 3),
             output_bias: padded("output.bias"),
-            bfloat16: None,
             transposed: OnceLock::new(),
         }
     }
@@ -139,7 +136,12 @@ impl Mlp {
     pub(super) fn in_bfloat16(mut self, token: Bfloat16) -> Self {
         let maps = self.layers.iter_mut().flat_map(|layer| [&mut layer.ff1, &mut layer.ff2]);
         self.input.iter_mut().map(|chunk| &mut chunk.weight).chain(maps).for_each(|m| m.round(token));
-        Self { bfloat16: Some(token), transposed: OnceLock::new(), ..self }
+        Self { transposed: OnceLock::new(), ..self }
+    }
+
+    /// Whether matrices but for the output's are multiplied in bfloat16, and the sums that are gradients by them added so.
+    pub(super) fn bfloat16(&self) -> Option<Bfloat16> {
+        self.input.first()?.weight.pairs.as_ref().map(Pairs::token)
     }
 
     /// The matrices the other way round.

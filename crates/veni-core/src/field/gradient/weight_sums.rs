@@ -94,7 +94,7 @@ impl<'a, S: Simd> WeightRoom<'a, S> {
         });
         let layers = layers.collect();
         let (output, output_bias) = (take(&mut rest, 3 * h), take(&mut rest, 3));
-        Self { turned, bfloat16: mlp.bfloat16, input, layers, output, output_bias }
+        Self { turned, bfloat16: mlp.bfloat16(), input, layers, output, output_bias }
     }
 
     /// x gᵀ for the directional inputs; every chunk's features fill whole panels of `encodings`.
