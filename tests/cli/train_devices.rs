@@ -1,7 +1,7 @@
 //! `train --device`: what is chosen, what it says, and what happens where it is missing. That devices compute the same
 //! numbers is tested in veni-core (`train::device_tests`).
 
-use crate::util::{Dir, panoramas, text, train_args};
+use crate::util::{Dir, finish, panoramas, text, train_args};
 
 fn args<'a>(data: &'a str, out: &'a str, device: &'a str) -> Vec<&'a str> {
     [&train_args(data, out, "2")[..], &["--device", device]].concat()
@@ -57,11 +57,78 @@ fn mixed_precision_trains_where_the_processor_has_it() {
     assert!(!dir.path("other").exists());
 }
 
+/// Two shares of the processor's threads compute the run that one device computes, and the run remembers them.
+#[test]
+fn devices_share_a_batch_and_are_remembered() {
+    let dir = Dir::new();
+    let data = text(panoramas());
+    let with = |out, devices| [args(&data, out, "flex"), vec!["--devices", devices]].concat();
+    dir.ok(&with("two", "0,1"));
+    assert_eq!(configured(&dir, "two", "devices"), "0,1");
+    dir.ok(&with("one", "0"));
+    let loss = |run: &str| {
+        let log = std::fs::read_to_string(dir.path(run).join("metrics.jsonl")).unwrap();
+        serde_json::from_str::<serde_json::Value>(log.lines().next().unwrap()).unwrap()["loss"]
+            .as_f64()
+            .unwrap()
+    };
+    let (two, one) = (loss("two"), loss("one"));
+    assert!((two - one).abs() < 2e-5 * one, "{two} {one}");
+    assert!(dir.ok(&["inspect", "two/model.safetensors", "--json"]).contains("--devices 0,1"));
+
+    // whatever this machine's threads are, a run goes on with what it began with
+    dir.ok(&[args(&data, "two", "flex"), vec!["--resume"]].concat());
+    dir.ok(&[with("two", "0,1"), vec!["--resume"]].concat());
+    let run = dir.run(&[with("two", "0"), vec!["--resume"]].concat());
+    assert!(run.code == Some(2) && run.err.contains("begun with 'devices = \"0,1\"'"), "{run:?}");
+
+    for (devices, said) in [("0,0", "named twice"), ("0,1,2,3,4,5,6,7,8", "cannot be shared"), ("0,x", "x")] {
+        let run = dir.run(&with("other", devices));
+        assert!(run.code == Some(2) && run.err.contains(said), "{devices}: {run:?}");
+    }
+    let run = dir.run(&[with("other", "0,1"), vec!["--system", "reni++"]].concat());
+    assert!(run.code == Some(2) && run.err.contains("whole batch"), "{run:?}");
+    assert!(!dir.path("other").exists());
+}
+
+/// By itself a run takes as many shares of the threads as divide its batch.
+#[test]
+fn threads_are_shared_by_themselves() {
+    let dir = Dir::new();
+    let data = text(panoramas());
+    let run = |out: &str, threads: &str, more: &[&str]| {
+        let args = [&args(&data, out, "flex")[..], &["--set", "batch=4"], more].concat();
+        let run = finish(dir.command(&args).env("RAYON_NUM_THREADS", threads));
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let config = std::fs::read_to_string(dir.path(out).join("config.toml")).unwrap();
+        config.contains("devices = ").then(|| configured(&dir, out, "devices"))
+    };
+    assert_eq!(run("one", "1", &[]), None);
+    assert_eq!(run("two", "3", &[]).as_deref(), Some("0,1"));
+    assert_eq!(run("named", "3", &["--set", "devices=0"]), None);
+}
+
+/// A graphics card that is not there is named, with where to look.
+#[cfg(all(feature = "wgpu", feature = "gpu"))]
+#[test]
+fn a_card_that_is_missing_is_named() {
+    if crate::gpu::skipped("a_card_that_is_missing_is_named") {
+        return;
+    }
+    let dir = Dir::new();
+    let run = dir.run(
+        &[args(&text(panoramas()), "run", "wgpu"), vec!["--devices", "0,77", "--set", "batch=2"]].concat(),
+    );
+    assert_eq!((run.code, run.out.as_str(), run.err.lines().count()), (Some(2), "", 1), "{run:?}");
+    assert!(run.err.contains("no graphics card number") && run.err.contains("inspect --devices"), "{run:?}");
+    assert!(dir.files().is_empty(), "{:?}", dir.files());
+}
+
 /// A Vulkan loader that finds no driver stands in for a machine without a graphics device.
 #[cfg(all(feature = "wgpu", feature = "gpu", target_os = "linux"))]
 #[test]
 fn without_a_graphics_device_auto_takes_the_processor_and_wgpu_is_refused() {
-    use crate::{gpu::without_drivers, util::finish};
+    use crate::gpu::without_drivers;
     let dir = Dir::new();
     let data = text(panoramas());
     let run = finish(&mut without_drivers(&dir, &args(&data, "run", "wgpu")));

@@ -10,13 +10,12 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use burn::tensor::Gradients;
 use veni_core::data::Splits;
 use veni_core::train::checkpoint::{self, CheckpointInfo};
-use veni_core::train::loss::LossTerms;
 use veni_core::train::network::{Network, Prepared};
 use veni_core::train::optimiser::{Group, Optimiser};
 use veni_core::train::presets::Preset;
+use veni_core::train::replicas::{Computed, Replicas};
 use veni_core::vae::weights::{self, Weight, Weights};
 use veni_core::{Error, Result};
 
@@ -44,29 +43,32 @@ fn main() -> Result<()> {
     config.check()?;
 
     let splits = Splits::open(&config.data, config.seed)?;
-    let device = config.device.device()?.autodiff();
+    let opened = config.device.open_all(&config.devices)?;
+    let devices: Vec<_> = opened.into_iter().map(|opened| opened.device.autodiff()).collect();
     config.decoder_by.check()?;
     let start_bytes = status_bytes("VmRSS");
-    let mut network = Network::new(&config, splits.train.len(), &device)?;
+    let network = Network::new(&config, splits.train.len(), &devices[0])?;
     let parameters: usize = weights::read(&network, "").values().map(|w| w.data.len()).sum();
     let groups = config.groups().into_iter();
     let groups = groups.map(|(prefix, g)| Group { prefix: prefix.into(), adam: g.adam });
     let mut optimiser = Optimiser::new(&network, groups.collect(), config.ema_decay)?;
     let source = network.source(&config, &splits.train)?;
     let batches: Vec<Prepared> = (1..=1 + steps).map(|step| source.prepare(step)).collect();
-    let loss = Network::loss(&config, &device);
+    let mut replicas = Replicas::new(network, &config, &devices)?;
 
     let (mut seconds, mut losses) = (Vec::new(), Vec::new());
-    for batch in &batches {
+    for batch in batches {
+        let (step, recorded) = (batch.step(), record_to.map(|path| (path, batch.clone())));
         let clock = Instant::now();
-        let (terms, gradients) = network.gradients(batch, &loss, config.decoder_by, &device);
-        losses.push(terms.values().0);
-        if let (Some(path), 1) = (record_to, batch.step()) {
-            record(path, &network, batch, terms, &gradients)?;
+        let computed = replicas.gradients(batch, config.accumulate);
+        losses.push(computed.value);
+        if let (Some((path, batch)), 1) = (recorded, step) {
+            record(path, replicas.first(), &batch, &computed)?;
         }
         let configured = config.groups();
-        let rates: Vec<_> = configured.iter().map(|(_, g)| g.learning_rate.at(batch.step() - 1)).collect();
-        (network, _) = optimiser.step(network.clone(), &gradients, &rates);
+        let rates: Vec<_> = configured.iter().map(|(_, g)| g.learning_rate.at(step - 1)).collect();
+        optimiser.update(&computed.gradients, &rates);
+        replicas.write(&optimiser.weights())?;
         seconds.push(clock.elapsed().as_secs_f64());
     }
     if let Some(loss) = losses.iter().find(|loss| !loss.is_finite()) {
@@ -78,6 +80,7 @@ fn main() -> Result<()> {
         "preset": preset_name,
         "latent_vectors": latent_vectors,
         "panoramas": config.batch,
+        "devices": config.devices.count(),
         "directions": height * width,
         "parameters": parameters,
         "threads": rayon::current_num_threads(),
@@ -93,13 +96,7 @@ fn main() -> Result<()> {
 }
 
 /// Writes one step as tensors `weight.*`, `batch.*`, `loss.*` and `gradient.*`.
-fn record(
-    path: &Path,
-    network: &Network,
-    batch: &Prepared,
-    terms: LossTerms,
-    gradients: &Gradients,
-) -> Result<()> {
+fn record(path: &Path, network: &Network, batch: &Prepared, computed: &Computed) -> Result<()> {
     let Prepared::Panoramas(batch) = batch else {
         return Err(Error::invalid("only steps of auto-encoders are recorded"));
     };
@@ -107,10 +104,9 @@ fn record(
         weights.into_iter().map(|(name, weight)| (format!("{prefix}.{name}"), weight)).collect()
     };
     let mut all: Weights = under("weight", weights::read(network, "")).into_iter().collect();
-    all.extend(under("gradient", weights::gradients(network, "", gradients)));
-    for term in terms.terms {
-        let data = vec![term.value.into_scalar::<f32>()];
-        all.insert(format!("loss.{}", term.name), Weight { shape: vec![1], data });
+    all.extend(under("gradient", computed.gradients.clone()));
+    for (name, value) in &computed.parts {
+        all.insert(format!("loss.{name}"), Weight { shape: vec![1], data: vec![*value as f32] });
     }
     let ([rows, columns], images) = (batch.loss_size, batch.images);
     let Network::Veni(veni) = network else { unreachable!("batches of panoramas are an auto-encoder's") };

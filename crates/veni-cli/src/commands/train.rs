@@ -14,7 +14,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use veni_core::data::Fold;
 use veni_core::model::ModelKind;
-use veni_core::train::config::{DecoderBy, DeviceKind, TrainConfig};
+use veni_core::train::config::{DecoderBy, DeviceKind, Devices, TrainConfig};
 use veni_core::train::init::Initialised;
 use veni_core::train::presets::Preset;
 use veni_core::train::run::{Finish, Trainer};
@@ -49,6 +49,7 @@ use watch::Watch;
         veni-cli train --data hdri --pretrain-synthetic 5000 --out runs/three\n  \
         veni-cli train --data indoor --init runs/small --steps 3000 --out runs/indoor\n  \
         veni-cli train --data hdri --synthetic 10000 --out runs/more   beside 10,000 generated scenes\n  \
+        veni-cli train --data hdri --preset paper --device cuda --devices 0,1,2,3 --set batch=16 --out runs/cards\n  \
         veni-cli train --data hdri --out runs/kld --set loss.kld=0.001 --set batch=8\n  \
         veni-cli train --config runs/small/config.toml --seed 2 --out runs/second"
 )]
@@ -121,6 +122,11 @@ pub(crate) struct Train {
     /// What computes [default: flex, or what the file of --config says]
     #[arg(long, value_enum)]
     device: Option<TrainDevice>,
+
+    /// Which devices of that kind, counted from 0: each computes a part of every batch [default: the first; on a
+    /// processor as many shares of its threads as divide a batch evenly]
+    #[arg(long, value_name = "I,J,…")]
+    devices: Option<Devices>,
 
     /// Multiply the decoder's matrices in bfloat16, sums and all else in f32 (decoder_by = kernels-bfloat16): faster on
     /// processors with AVX512-BF16, an error on others
@@ -297,16 +303,17 @@ impl Train {
     }
 }
 
-/// What a graphics device is, and what about it will be slow.
+/// What the graphics devices are, and what about them will be slow.
 fn note_device(config: &TrainConfig, report: Report) -> Result<()> {
     let kind = config.device;
     if kind.decoder_by() == DecoderBy::Kernels {
         return Ok(());
     }
-    let opened = kind.open()?;
-    report.note(format_args!("training on {}", opened.name));
-    if opened.software {
-        report.note(format_args!("{} is a software adapter; --device flex is faster", opened.name));
+    for opened in kind.open_all(&config.devices)? {
+        report.note(format_args!("training on {}", opened.name));
+        if opened.software {
+            report.note(format_args!("{} is a software adapter; --device flex is faster", opened.name));
+        }
     }
     if config.decoder_by.is_kernels() {
         report.note("decoder_by = kernels: the decoder is computed by the processor, not on the device");

@@ -29,26 +29,28 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// The same panoramas in `parts` batches of one size.
+    /// The same panoramas in `parts` batches, whose sizes differ by one at most.
     ///
     /// # Panics
-    /// If `parts` does not divide their number.
+    /// If there are fewer panoramas than parts.
     pub fn split(&self, parts: usize) -> Vec<Self> {
-        assert!(self.images.is_multiple_of(parts), "{} panoramas in {parts} equal parts", self.images);
-        let part = |values: &[f32], at: usize| {
-            let size = values.len() / parts;
-            values[at * size..][..size].to_vec()
+        let images = self.images;
+        assert!((1..=images).contains(&parts), "{images} panoramas in {parts} parts");
+        let part = |values: &[f32], [from, to]: [usize; 2]| {
+            let size = values.len() / images;
+            values[from * size..to * size].to_vec()
         };
         (0..parts)
-            .map(|at| Self {
+            .map(|at| [at * images / parts, (at + 1) * images / parts])
+            .map(|range| Self {
                 step: self.step,
-                images: self.images / parts,
-                stripe_directions: part(&self.stripe_directions, at),
-                stripe_samples: part(&self.stripe_samples, at),
+                images: range[1] - range[0],
+                stripe_directions: part(&self.stripe_directions, range),
+                stripe_samples: part(&self.stripe_samples, range),
                 loss_size: self.loss_size,
                 loss_directions: self.loss_directions.clone(),
-                target: part(&self.target, at),
-                noise: part(&self.noise, at),
+                target: part(&self.target, range),
+                noise: part(&self.noise, range),
             })
             .collect()
     }

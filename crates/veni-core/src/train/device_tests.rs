@@ -13,6 +13,7 @@ use crate::sphere::Equirect;
 use crate::train::config::{DecoderBy, DeviceKind, TrainConfig};
 use crate::train::network::{Network, Prepared};
 use crate::train::presets::Preset;
+use crate::train::replicas::Replicas;
 use crate::train::schedule::WeightSchedule;
 use crate::train::step;
 use crate::vae::weights::{self, Weights};
@@ -134,6 +135,63 @@ fn every_device_computes_the_same_step() {
             }
         }
     }
+}
+
+/// A batch shared among all devices of this build, the last of which has two panoramas of five, is the batch on one. With a
+/// wrong weight for its parts it is not.
+#[test]
+fn devices_of_every_kind_share_a_batch() {
+    let mut config = Preset::Tiny.config(3);
+    (config.batch, config.decoder_by) = (5, DecoderBy::Tensors);
+    let skies = skies();
+    let kinds = devices();
+    let opened: Vec<_> = kinds.iter().map(|kind| kind.device().unwrap().autodiff()).collect();
+    let first = Network::new(&config, skies.len(), &opened[0]).unwrap();
+    let batch = first.source(&config, &skies).unwrap().prepare(1);
+    let on = |devices: &[burn::tensor::Device], batch: &Prepared| {
+        let computed = Replicas::new(first.clone(), &config, devices).unwrap().gradients(batch.clone(), 1);
+        let (total, parts, gradients) = (computed.value, computed.parts, computed.gradients);
+        Step { total, parts, gradients, encoded: Vec::new() }
+    };
+    let whole = on(&opened[..1], &batch);
+    // at least two, if of one kind
+    let shared: Vec<_> = opened.iter().chain(&opened[..1]).cloned().collect();
+    let found = deviations(&whole, &on(&shared, &batch));
+    say(&format!("shared among {kinds:?} and the first again: {found:.3?} of what is allowed"));
+    assert!(found.iter().all(|d| *d < 1.0), "{found:?} of what is allowed");
+
+    let mut parts = batch.split(2).into_iter().map(|part| on(&opened[..1], &part));
+    let (mut mean, other) = (parts.next().unwrap(), parts.next().unwrap());
+    mean.total = f64::midpoint(mean.total, other.total);
+    for (name, gradient) in &mut mean.gradients {
+        let other = &other.gradients[name].data;
+        gradient.data.iter_mut().zip(other).for_each(|(a, b)| *a = f32::midpoint(*a, *b));
+    }
+    let found = deviations(&whole, &mean);
+    assert!(found[0] > 3.0 && found[1] > 3.0, "{found:?}");
+}
+
+/// New weights reach every device: after them each computes what the first does.
+#[test]
+fn new_weights_reach_every_device() {
+    let config = Preset::Tiny.config(3);
+    let skies = skies();
+    let opened: Vec<_> = devices().iter().map(|kind| kind.device().unwrap().autodiff()).collect();
+    let devices: Vec<_> = opened.iter().chain(&opened[..1]).cloned().collect();
+    let mut other = config.clone();
+    other.seed += 1;
+    let [network, moved] =
+        [&config, &other].map(|config| Network::new(config, skies.len(), &opened[0]).unwrap());
+    let mut shared = config.clone();
+    shared.batch = devices.len();
+    let batch = network.source(&shared, &skies).unwrap().prepare(1);
+    let mut replicas = Replicas::new(network, &shared, &devices).unwrap();
+    let before = replicas.gradients(batch.clone(), 1).value;
+    replicas.write(&weights::read(&moved, "")).unwrap();
+    let expected = Replicas::new(moved, &shared, &devices[..1]).unwrap().gradients(batch.clone(), 1).value;
+    let found = replicas.gradients(batch, 1).value;
+    assert!((found - expected).abs() < 2e-5 * expected, "{found} {expected}");
+    assert!((before - expected).abs() > 1e-2 * expected, "{before} {expected}");
 }
 
 /// A weight that is off by a thousandth of itself, of the encoder or of the decoder, is seen by the comparison.

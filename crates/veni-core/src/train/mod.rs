@@ -1,5 +1,5 @@
 //! Training: what defines a run ([`config`], [`presets`], [`init`]), what one update does ([`batch`], [`step`], [`loss`],
-//! [`schedule`], [`optimiser`]; of an auto-decoder [`rays`] and [`latents`]), and the loop with its folder ([`run`], [`checkpoint`], [`progress`]).
+//! [`replicas`], [`schedule`], [`optimiser`]; of an auto-decoder [`rays`] and [`latents`]), and the loop with its folder ([`run`], [`checkpoint`], [`progress`]).
 
 pub mod batch;
 pub mod checkpoint;
@@ -18,6 +18,7 @@ pub mod presets;
 mod preview;
 pub mod progress;
 pub mod rays;
+pub mod replicas;
 pub mod run;
 pub mod schedule;
 pub mod step;

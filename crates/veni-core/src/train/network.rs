@@ -146,10 +146,10 @@ impl Prepared {
         }
     }
 
-    /// The same in `parts` batches of one size.
+    /// The same in `parts` batches, whose sizes differ by one at most.
     ///
     /// # Panics
-    /// If `parts` does not divide the number of panoramas, or the batch is of rays, whose losses belong together.
+    /// If there are fewer panoramas than parts, or the batch is of rays, whose losses belong together.
     pub fn split(&self, parts: usize) -> Vec<Self> {
         match self {
             Self::Panoramas(batch) => batch.split(parts).into_iter().map(Self::Panoramas).collect(),

@@ -126,20 +126,17 @@ impl Optimiser {
         grads: &Gradients,
         learning_rates: &[f64],
     ) -> (M, Vec<GroupReport>) {
-        let gradients = weights::gradients(&module, "", grads);
-        self.step_along(module, &gradients, learning_rates)
+        let reports = self.update(&weights::gradients(&module, "", grads), learning_rates);
+        let module =
+            weights::write(module, "", &self.weights()).expect("the module that the state was made for");
+        (module, reports)
     }
 
-    /// [`Optimiser::step`] with gradients by the parameters' paths.
+    /// One update by gradients under the parameters' paths; [`Optimiser::weights`] are then to be put into the module.
     ///
     /// # Panics
-    /// As [`Optimiser::step`].
-    pub fn step_along<M: Module>(
-        &mut self,
-        module: M,
-        grads: &Weights,
-        learning_rates: &[f64],
-    ) -> (M, Vec<GroupReport>) {
+    /// If there is not one learning rate per group, or a gradient that belongs to no parameter.
+    pub fn update(&mut self, grads: &Weights, learning_rates: &[f64]) -> Vec<GroupReport> {
         assert_eq!(learning_rates.len(), self.groups.len(), "one learning rate per optimiser group");
         let norms = self.norms(grads);
         self.updates += 1;
@@ -152,12 +149,8 @@ impl Optimiser {
                 slot.update(&gradient.data, &rules[slot.group]);
             }
         }
-        let module =
-            weights::write(module, "", &self.weights()).expect("the module that the state was made for");
         let reports = norms.iter().zip(learning_rates);
-        let reports =
-            reports.map(|(&gradient_norm, &learning_rate)| GroupReport { gradient_norm, learning_rate });
-        (module, reports.collect())
+        reports.map(|(&gradient_norm, &learning_rate)| GroupReport { gradient_norm, learning_rate }).collect()
     }
 
     /// Current weights.

@@ -12,14 +12,12 @@
 //! A run is a function of its configuration: batches and noise are named by their step, so continuing from a
 //! checkpoint gives the weights of the uninterrupted run to the bit (on one device and number of threads).
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::Instant;
 
 use burn::module::Module;
-use burn::tensor::Device;
 use serde::Serialize;
 
 use crate::data::{Dataset, Splits};
@@ -27,11 +25,11 @@ use crate::train::checkpoint::{self, Best, CheckpointInfo};
 use crate::train::config::{Stage, TrainConfig};
 use crate::train::init::Initialised;
 use crate::train::log::MetricsLog;
-use crate::train::loss::Loss;
 use crate::train::network::{Network, Prepared};
 use crate::train::optimiser::{Group, Optimiser};
 use crate::train::progress::{Progress, StepReport, ValidationReport};
-use crate::vae::weights::{self, Weights};
+use crate::train::replicas::{Computed, Replicas};
+use crate::vae::weights;
 use crate::{Error, Result};
 
 mod begin;
@@ -61,8 +59,7 @@ pub struct Trainer {
     stages: Vec<Running>,
     /// The command line recorded in the model file.
     command: String,
-    device: Device,
-    network: Network,
+    replicas: Replicas,
     optimiser: Optimiser,
     best: Option<Best>,
     initialised: Option<Initialised>,
@@ -72,7 +69,6 @@ pub struct Trainer {
 #[derive(Clone, Debug)]
 struct Running {
     stage: Stage,
-    loss: Loss,
     /// Its own training panoramas; absent if they are the run's, or not needed any more.
     data: Option<Dataset>,
 }
@@ -90,7 +86,7 @@ impl Trainer {
 
     /// The network with its current (not averaged) weights.
     pub fn network(&self) -> &Network {
-        &self.network
+        self.replicas.first()
     }
 
     /// What a run that was just created has from `config.init`.
@@ -126,24 +122,24 @@ impl Trainer {
         progress: &mut dyn Progress,
         log: &mut MetricsLog,
     ) -> Result<Finish> {
-        let Running { stage, loss, data } = self.stages[at].clone();
+        let Running { stage, data } = self.stages[at].clone();
         self.optimiser.set_groups(groups(&stage.config));
+        self.replicas.set_losses(&stage.config);
         let train = data.unwrap_or_else(|| self.splits.train.clone());
-        let batches = self.network.source(&stage.config, &train)?;
+        let batches = self.network().source(&stage.config, &train)?;
         let steps = self.steps_done() - stage.first + 1..=stage.config.steps;
         std::thread::scope(|scope| {
             let (send, receive) = mpsc::sync_channel(AHEAD);
             // ends early when nobody receives any more
             scope.spawn(move || steps.into_iter().all(|step| send.send(batches.prepare(step)).is_ok()));
             // `receive` is moved in, so that whatever ends the loop also ends the thread
-            self.updates(&stage, &loss, receive, stop, progress, log)
+            self.updates(&stage, receive, stop, progress, log)
         })
     }
 
     fn updates(
         &mut self,
         stage: &Stage,
-        loss: &Loss,
         batches: mpsc::Receiver<Prepared>,
         stop: &AtomicBool,
         progress: &mut dyn Progress,
@@ -158,7 +154,7 @@ impl Trainer {
                 self.checkpoint(log, progress)?;
                 return Ok(Finish::Stopped);
             }
-            let update = self.update(stage, loss, batch)?;
+            let update = self.update(stage, batch)?;
             // a running mean: steady against single slow updates, quick to follow a changed machine
             let mean = pace.map_or(update.seconds, |p: f64| p + 0.05 * (update.seconds - p));
             pace = Some(mean);
@@ -179,11 +175,11 @@ impl Trainer {
     }
 
     /// One update.
-    fn update(&mut self, stage: &Stage, loss: &Loss, batch: Prepared) -> Result<StepReport> {
+    fn update(&mut self, stage: &Stage, batch: Prepared) -> Result<StepReport> {
         let clock = Instant::now();
         let (local, images) = (batch.step(), batch.images());
         let step = stage.first + local;
-        let Computed { value, parts, gradients } = self.gradients(stage, loss, batch);
+        let Computed { value, parts, gradients } = self.replicas.gradients(batch, stage.config.accumulate);
         if !value.is_finite() {
             return Err(Error::invalid(format!(
                 "the loss is {value} at update {step}: lower the learning rates or the clipping norm"
@@ -192,8 +188,8 @@ impl Trainer {
         // schedules count from 0: with a warm-up the first update has rate 0, as the authors' has
         let configured = stage.config.groups();
         let rates: Vec<_> = configured.iter().map(|(_, group)| group.learning_rate.at(local - 1)).collect();
-        let (network, groups) = self.optimiser.step_along(self.network.clone(), &gradients, &rates);
-        self.network = network;
+        let groups = self.optimiser.update(&gradients, &rates);
+        self.replicas.write(&self.optimiser.weights())?;
         let seconds = clock.elapsed().as_secs_f64();
         let by_name = |f: &dyn Fn(usize) -> f64| {
             configured.iter().enumerate().map(|(i, (name, _))| (*name, f(i))).collect()
@@ -210,26 +206,6 @@ impl Trainer {
         })
     }
 
-    /// Loss and gradients of a batch, computed in as many parts as the stage says.
-    fn gradients(&self, stage: &Stage, loss: &Loss, batch: Prepared) -> Computed {
-        let count = stage.config.accumulate;
-        if count == 1 {
-            return self.part(loss, &batch);
-        }
-        let mut sum = Computed::default();
-        for batch in batch.split(count) {
-            sum.add(self.part(loss, &batch));
-        }
-        sum.divided(count)
-    }
-
-    fn part(&self, loss: &Loss, batch: &Prepared) -> Computed {
-        let by = self.config.decoder_by;
-        let (terms, gradients) = self.network.gradients(batch, loss, by, &self.device);
-        let (value, parts) = terms.values();
-        Computed { value, parts, gradients: weights::gradients(&self.network, "", &gradients) }
-    }
-
     fn checkpoint(&self, log: &MetricsLog, progress: &mut dyn Progress) -> Result<()> {
         // a state that is on disk must find its lines there too
         log.sync()?;
@@ -241,39 +217,6 @@ impl Trainer {
 
     fn checkpoint_path(&self) -> PathBuf {
         checkpoint_path(&self.folder)
-    }
-}
-
-/// What a batch, or a part of one, says.
-#[derive(Debug, Default)]
-struct Computed {
-    value: f64,
-    parts: BTreeMap<&'static str, f64>,
-    gradients: Weights,
-}
-
-impl Computed {
-    fn add(&mut self, other: Self) {
-        self.value += other.value;
-        for (name, value) in other.parts {
-            *self.parts.entry(name).or_default() += value;
-        }
-        for (name, gradient) in other.gradients {
-            match self.gradients.get_mut(&name) {
-                Some(sum) => sum.data.iter_mut().zip(&gradient.data).for_each(|(s, g)| *s += g),
-                None => drop(self.gradients.insert(name, gradient)),
-            }
-        }
-    }
-
-    fn divided(mut self, count: usize) -> Self {
-        let share = 1.0 / count as f64;
-        self.value *= share;
-        self.parts.values_mut().for_each(|value| *value *= share);
-        for gradient in self.gradients.values_mut() {
-            gradient.data.iter_mut().for_each(|g| *g *= share as f32);
-        }
-        self
     }
 }
 

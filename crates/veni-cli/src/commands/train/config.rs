@@ -65,12 +65,25 @@ impl Train {
                 "--pretrain-steps: there is nothing to pre-train on; give --pretrain or --pretrain-synthetic"
             );
         }
-        let config = config.with_overrides(&self.set).context("--set")?;
+        let mut config = config.with_overrides(&self.set).context("--set")?;
+        if let Some(devices) = &self.devices {
+            config.devices.clone_from(devices);
+        } else if !self.names_devices() {
+            config.share_threads(rayon::current_num_threads());
+        }
         if self.mixed_precision && config.decoder_by != DecoderBy::KernelsBfloat16 {
             bail!("--mixed-precision: a --set takes it back; leave one of them out");
         }
         config.check()?;
         Ok(config)
+    }
+
+    /// Whether it is said which devices of their kind compute, if by a file that does not mention them.
+    fn names_devices(&self) -> bool {
+        let set = self.set.iter().filter_map(|set| set.split_once('='));
+        self.devices.is_some()
+            || self.config.is_some()
+            || set.into_iter().any(|(key, _)| key.trim() == "devices")
     }
 
     fn pretrains(&self) -> bool {
@@ -90,6 +103,7 @@ impl Train {
             || self.synthetic.is_some()
             || self.fold.is_some()
             || self.device.is_some()
+            || self.devices.is_some()
             || self.mixed_precision
             || !self.set.is_empty();
         if !described && !changed {
@@ -106,6 +120,10 @@ impl Train {
         if let (Some(old), Some(new)) = (&old.init, &mut new.init) {
             // known only once the model was read
             new.digest = new.digest.take().or_else(|| old.digest.clone());
+        }
+        if !self.names_devices() {
+            // another machine may have other threads to share
+            new.devices.clone_from(&old.devices);
         }
         let (old, new) = (old.to_toml()?, new.to_toml()?);
         let differing = old.lines().zip(new.lines()).find(|(a, b)| a != b);
@@ -166,6 +184,7 @@ impl Train {
             ("--synthetic", self.synthetic.map(|n| n as u64)),
         ];
         words.extend(numbers.into_iter().filter_map(|(name, n)| Some(format!("{name} {}", n?))));
+        words.extend(self.devices.iter().map(|devices| format!("--devices {devices}")));
         words.extend(self.mixed_precision.then(|| "--mixed-precision".to_owned()));
         words.extend(self.set.iter().map(|set| format!("--set {}", shell_word(Path::new(set)))));
         words.push(format!("--out {}", last(&self.out)));

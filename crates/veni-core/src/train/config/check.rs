@@ -24,12 +24,7 @@ impl TrainConfig {
         if self.batch == 0 {
             return Err(Error::invalid("batch = 0: needs at least one panorama per step"));
         }
-        if self.accumulate == 0 || !self.batch.is_multiple_of(self.accumulate) {
-            return Err(Error::invalid(format!(
-                "accumulate = {}: must divide batch = {}, and be positive",
-                self.accumulate, self.batch
-            )));
-        }
+        self.check_parts()?;
         if self.decoder_by == DecoderBy::KernelsBfloat16 {
             self.model.decoder.check_folds().map_err(|_| {
                 Error::invalid(
@@ -50,6 +45,24 @@ impl TrainConfig {
             }
         }
         self.check_stages()
+    }
+
+    /// In how many parts a batch is computed.
+    fn check_parts(&self) -> Result<()> {
+        let (batch, accumulate, devices) = (self.batch, self.accumulate, &self.devices);
+        if accumulate == 0 || accumulate > batch {
+            return Err(Error::invalid(format!(
+                "accumulate = {accumulate}: must lie in 1..={batch} (batch)"
+            )));
+        }
+        if accumulate * devices.count() > batch {
+            let parts = if accumulate > 1 { format!(" in {accumulate} parts each") } else { String::new() };
+            return Err(Error::invalid(format!(
+                "devices = {devices}: batch = {batch} cannot be shared among {}{parts}; raise batch, or name fewer",
+                devices.count()
+            )));
+        }
+        Ok(())
     }
 
     /// What the two systems need, and must not have.
@@ -79,6 +92,13 @@ impl TrainConfig {
                         "accumulate = {}: the losses of an auto-decoder are taken over its whole batch; to save memory \
                          lower latents.rays",
                         self.accumulate
+                    )));
+                }
+                if self.devices.count() > 1 {
+                    return Err(Error::invalid(format!(
+                        "devices = {}: the losses of an auto-decoder are taken over its whole batch, which cannot be \
+                         shared; name one",
+                        self.devices
                     )));
                 }
                 if !self.loss.mage.is_off() {

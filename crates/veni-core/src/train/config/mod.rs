@@ -11,7 +11,7 @@ mod tests;
 
 use serde::{Deserialize, Serialize};
 
-pub use device::{DecoderBy, DeviceKind, Opened};
+pub use device::{DecoderBy, DeviceKind, Devices, Opened};
 pub use loss_grid::LossGrid;
 pub use report::{ReportConfig, Stored};
 pub use stage::{Stage, StageConfig};
@@ -36,14 +36,18 @@ pub struct TrainConfig {
     pub steps: u64,
     /// Panoramas per step.
     pub batch: usize,
-    /// Parts that a batch is computed in, one after the other, with their gradients averaged: the same step up to
-    /// rounding, in the memory of `batch / accumulate` panoramas.
+    /// Parts that a batch is computed in on each device, one after the other, with their gradients averaged: the same
+    /// step up to rounding, in the memory of `batch / accumulate` panoramas.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub accumulate: usize,
     /// How a batch is drawn.
     pub order: Order,
     /// Where gradients are computed.
     pub device: DeviceKind,
+    /// Which of these devices, by number: each computes a part of every batch at the same time as the others. On a
+    /// processor every number is a share of its threads.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub devices: Devices,
     /// What computes the decoder and its gradients. A file that does not say it means what is best on its device
     /// ([`DeviceKind::decoder_by`]).
     #[serde(default)]
@@ -85,6 +89,10 @@ fn one() -> usize {
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
 fn is_one(n: &usize) -> bool {
     *n == 1
+}
+
+fn is_first(devices: &Devices) -> bool {
+    *devices == Devices::default()
 }
 
 /// How a batch is drawn from the training panoramas.
@@ -130,11 +138,22 @@ impl TrainConfig {
             .map_err(|e| Error::invalid(format!("the configuration has no TOML form: {e}")))
     }
 
-    /// Another device, and with it what computes the decoder best there.
+    /// Another device, the first of its kind, and with it what computes the decoder best there.
     pub fn set_device(&mut self, device: DeviceKind) {
         if self.device != device {
-            (self.device, self.decoder_by) = (device, device.decoder_by());
+            (self.device, self.devices, self.decoder_by) = (device, Devices::default(), device.decoder_by());
         }
+    }
+
+    /// On a processor as many devices, each with its share of `threads`, as divide every batch evenly: one where there
+    /// is but one thread, and of auto-decoders, whose batches are not shared. A graphics device stays one.
+    pub fn share_threads(&mut self, threads: usize) {
+        let processor = self.device.decoder_by().is_kernels() && self.latents.is_none();
+        let stages = self.stages().unwrap_or_default();
+        let batches = || stages.iter().map(|stage| stage.config.batch / stage.config.accumulate.max(1));
+        let fits = |count: &usize| batches().all(|batch| batch.is_multiple_of(*count));
+        let count = if processor { (1..=threads).rev().find(fits) } else { None };
+        self.devices = Devices::first(count.unwrap_or(1));
     }
 
     /// Parameter groups, by the first part of their parameters' paths: `decoder`, and `encoder` or `latents`.

@@ -9,8 +9,8 @@ use crate::{Error, Result};
 impl TrainConfig {
     /// The configuration with dotted keys replaced: each override is `key.path=value`, the value in TOML
     /// (bare words are taken as strings). With `steps`, learning rates that fell until the old last step fall
-    /// until the new one; another `device` brings its `decoder_by` along, unless that is named too
-    /// ([`Self::set_device`]). `stage.NAME.key.path` changes a stage, and with its steps those of the run.
+    /// until the new one; another `device` brings its `decoder_by` along and is the first of its kind, unless `decoder_by`
+    /// and `devices` are named too ([`Self::set_device`]). `stage.NAME.key.path` changes a stage, and with its steps those of the run.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the override that has no `=`, no such key, or a value of the wrong type.
@@ -18,11 +18,11 @@ impl TrainConfig {
         let broken =
             |text: &str, e: &dyn std::fmt::Display| Error::invalid(format!("override `{text}`: {e}"));
         let mut config = self.clone();
-        let mut decoder_named = false;
+        let mut named = Vec::new();
         for text in overrides.iter().map(AsRef::as_ref) {
             let (path, value) = text.split_once('=').ok_or_else(|| broken(text, &"has no `=`"))?;
             let path = path.trim();
-            decoder_named |= path == "decoder_by";
+            named.push(path);
             let mut table = Table::try_from(&config).map_err(|e| broken(text, &e))?;
             let value = parse_value(value.trim());
             set(&mut table, path, value).map_err(|e| broken(text, &e))?;
@@ -36,8 +36,15 @@ impl TrainConfig {
             config.steps = steps;
             config.set_steps(wanted);
         }
-        if !decoder_named && config.device != self.device {
-            config.decoder_by = config.device.decoder_by();
+        if config.device != self.device {
+            let mut other = self.clone();
+            other.set_device(config.device);
+            if !named.contains(&"decoder_by") {
+                config.decoder_by = other.decoder_by;
+            }
+            if !named.contains(&"devices") {
+                config.devices = other.devices;
+            }
         }
         Ok(config)
     }

@@ -182,9 +182,60 @@ fn accumulation_divides_a_batch_of_panoramas() {
     let config = Preset::Small.config(9);
     let checked = |text: &[&str]| config.with_overrides(text).unwrap().check();
     checked(&["accumulate=2"]).unwrap();
-    assert!(checked(&["accumulate=3"]).unwrap_err().to_string().contains("accumulate = 3"));
+    assert!(checked(&["accumulate=5"]).unwrap_err().to_string().contains("accumulate = 5"));
     assert!(checked(&["accumulate=0"]).unwrap_err().to_string().contains("accumulate = 0"));
     let reni = Preset::Small.auto_decoder(9).with_overrides(&["accumulate=2"]).unwrap();
     assert!(reni.check().unwrap_err().to_string().contains("latents.rays"));
     assert!(!config.to_toml().unwrap().contains("accumulate"), "what is not used is not written");
+}
+
+#[test]
+fn devices_share_a_batch_of_panoramas() {
+    let config = Preset::Small.config(9);
+    let checked = |text: &[&str]| config.with_overrides(text).unwrap().check();
+    for fine in [&["devices=0,1"][..], &["devices=3"], &["devices=3,0, 1"], &["devices=0,1", "accumulate=2"]]
+    {
+        checked(fine).unwrap();
+    }
+    for (bad, said) in [
+        (&["devices=0,1,2,3,4"][..], "batch = 4 cannot be shared among 5;"),
+        (&["devices=0,1", "accumulate=3"], "in 3 parts each"),
+        (&["devices=0,1", "batch=1"], "batch = 1"),
+    ] {
+        let message = checked(bad).unwrap_err().to_string();
+        assert!(message.contains(said), "{bad:?}: {message}");
+    }
+    for (bad, said) in [("", "not numbers"), ("0,2,0", "0 is named twice"), ("0,x", "0,x"), ("-1", "-1")] {
+        let message = bad.parse::<Devices>().unwrap_err().to_string();
+        assert!(message.contains(said) && message.contains("such as 0,1"), "{bad}: {message}");
+    }
+    let reni = Preset::Small.auto_decoder(9).with_overrides(&["devices=0,1"]).unwrap();
+    assert!(reni.check().unwrap_err().to_string().contains("whole batch"));
+    assert!(!config.to_toml().unwrap().contains("devices"), "what is not used is not written");
+    let two = config.with_overrides(&["devices=0,1"]).unwrap();
+    assert_eq!(TrainConfig::from_toml(&two.to_toml().unwrap()).unwrap(), two);
+    // cards are not threads: another kind of device begins at its first
+    assert_eq!(two.with_overrides(&["device=wgpu"]).unwrap().devices, Devices::default());
+    assert_eq!(config.with_overrides(&["devices=1,2", "device=wgpu"]).unwrap().devices.numbers(), [1, 2]);
+}
+
+#[test]
+fn threads_are_shared_where_a_batch_can_be_shared_evenly() {
+    let shared = |overrides: &[&str], threads: usize| {
+        let mut config = Preset::Small.config(9).with_overrides(overrides).unwrap();
+        config.share_threads(threads);
+        config.check().unwrap();
+        config.devices.count()
+    };
+    assert_eq!([1, 2, 3, 4, 16].map(|threads| shared(&[], threads)), [1, 2, 2, 4, 4]);
+    assert_eq!([2, 5, 9].map(|threads| shared(&["batch=5"], threads)), [1, 5, 5]);
+    assert_eq!(shared(&["accumulate=2"], 16), 2);
+    assert_eq!(shared(&["device=wgpu"], 16), 1);
+    let mut staged = Preset::Small.config(9).pretrained_on(&["ldr".into()], 0, 10).unwrap();
+    staged = staged.with_overrides(&["stage.pretrain.batch=6"]).unwrap();
+    staged.share_threads(4);
+    assert_eq!(staged.devices.numbers(), [0, 1], "of batches of 6 and 4");
+    let mut reni = Preset::Small.auto_decoder(9);
+    reni.share_threads(16);
+    assert_eq!(reni.devices, Devices::default());
 }

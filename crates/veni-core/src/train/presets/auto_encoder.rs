@@ -3,7 +3,7 @@
 use crate::data::{AugmentConfig, DataConfig};
 use crate::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 use crate::train::config::{
-    DecoderBy, DeviceKind, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig,
+    DecoderBy, DeviceKind, Devices, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig,
 };
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
@@ -50,6 +50,7 @@ pub(super) fn small(latent_vectors: usize) -> TrainConfig {
         accumulate: 1,
         order: Order::Shuffle,
         device: DeviceKind::Flex,
+        devices: Devices::default(),
         decoder_by: DecoderBy::Kernels,
         ema_decay: 0.999,
         model: ModelConfig {

@@ -91,7 +91,7 @@ impl Trainer {
         trainer.make_folders()?;
         if let Some((state, info)) = state {
             trainer.optimiser.restore(state, info.step).map_err(|e| e.in_file(&path))?;
-            trainer.network = weights::write(trainer.network, "", &trainer.optimiser.weights())?;
+            trainer.replicas.write(&trainer.optimiser.weights())?;
             trainer.best = info.best;
         }
         Ok(trainer)
@@ -106,17 +106,17 @@ impl Trainer {
         done: u64,
         heard: Heard<'_>,
     ) -> Result<Self> {
-        let device = config.device.device()?.autodiff();
+        let opened = config.device.open_all(&config.devices)?;
+        let devices: Vec<_> = opened.into_iter().map(|opened| opened.device.autodiff()).collect();
         config.decoder_by.check()?;
         let splits = Splits::open_heard(&config.data, config.seed, heard)?;
         let running = |stage: Stage| -> Result<Running> {
-            let loss = Network::loss(&stage.config, &device);
             let needed = stage.own_data && stage.end() > done;
             let data = needed.then(|| own_data(&stage, &splits.val, heard)).transpose()?;
-            Ok(Running { stage, loss, data })
+            Ok(Running { stage, data })
         };
         let stages = config.stages()?.into_iter().map(running).collect::<Result<_>>()?;
-        let mut network = Network::new(&config, splits.train.len(), &device)?;
+        let mut network = Network::new(&config, splits.train.len(), &devices[0])?;
         let mut initialised = None;
         if let (Some(model), Some(settings)) = (init, &config.init) {
             let (taken, said) =
@@ -124,8 +124,9 @@ impl Trainer {
             (network, initialised) = (taken, Some(said));
         }
         let optimiser = Optimiser::new(&network, groups(&config), config.ema_decay)?;
+        let replicas = Replicas::new(network, &config, &devices)?;
         let (folder, command, best) = (folder.to_path_buf(), command.to_owned(), None);
-        Ok(Self { folder, config, splits, stages, command, device, network, optimiser, best, initialised })
+        Ok(Self { folder, config, splits, stages, command, replicas, optimiser, best, initialised })
     }
 
     fn make_folders(&self) -> Result<()> {

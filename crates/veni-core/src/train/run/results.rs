@@ -33,7 +33,7 @@ impl Trainer {
     pub(super) fn averaged(&self) -> Result<Network> {
         let weights =
             if self.config.ema_decay > 0.0 { self.optimiser.averages() } else { self.optimiser.weights() };
-        Ok(weights::write(self.network.clone(), "", &weights)?.valid())
+        Ok(weights::write(self.network().clone(), "", &weights)?.valid())
     }
 
     pub(super) fn validate(&mut self, log: &mut MetricsLog, progress: &mut dyn Progress) -> Result<()> {
@@ -231,7 +231,7 @@ impl Trainer {
     pub(super) fn finish(&mut self, log: &mut MetricsLog, progress: &mut dyn Progress) -> Result<()> {
         self.validate(log, progress)?;
         self.preview(progress)?;
-        if let Network::Reni(_) = self.network {
+        if let Network::Reni(_) = self.network() {
             // its prior has no copies to wait for
             return Ok(());
         }

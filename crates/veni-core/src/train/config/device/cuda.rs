@@ -1,18 +1,23 @@
-//! The CUDA device. The driver is loaded at run time; asking for devices without one finds none.
+//! CUDA devices. The driver is loaded at run time; asking for devices without one finds none.
 
 use burn::tensor::{Device, DeviceType};
 
 use super::Opened;
 use crate::{Error, Result};
 
-pub(super) fn open() -> Result<Opened> {
-    let found = Device::enumerate(DeviceType::Cuda).into_iter().next();
-    let device = found.ok_or_else(|| {
-        Error::unsupported(
+/// Device `number`, from 0.
+pub(super) fn open(number: usize) -> Result<Opened> {
+    let found: Vec<_> = Device::enumerate(DeviceType::Cuda).into_iter().collect();
+    let device = found.get(number).cloned().ok_or_else(|| match found.len() {
+        0 => Error::unsupported(
             "device cuda: no CUDA device or driver: install NVIDIA's driver (nvidia-smi must list a card, and \
              CUDA_VISIBLE_DEVICES must not hide it), or take device wgpu or flex",
-        )
+        ),
+        count => Error::unsupported(format!(
+            "device cuda: there is no number {number}: nvidia-smi -L lists {count}, counted from 0 \
+             (CUDA_VISIBLE_DEVICES hides others); name those with --devices"
+        )),
     })?;
-    let name = device.identity().map_or_else(|| "CUDA device 0".into(), |identity| identity.name);
+    let name = device.identity().map_or_else(|| format!("CUDA device {number}"), |identity| identity.name);
     Ok(Opened { device, name, software: false })
 }

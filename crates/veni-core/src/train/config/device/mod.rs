@@ -11,6 +11,7 @@
 
 #[cfg(feature = "cuda")]
 mod cuda;
+mod numbers;
 #[cfg(test)]
 mod tests;
 #[cfg(feature = "wgpu")]
@@ -18,6 +19,8 @@ mod wgpu;
 
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
+
+pub use numbers::Devices;
 
 use crate::Result;
 
@@ -104,11 +107,31 @@ impl DeviceKind {
         self.open().map(|opened| opened.device)
     }
 
-    /// The device and what it is.
+    /// The device and what it is: the first of its kind.
     ///
     /// # Errors
     /// [`Error::Unsupported`](crate::Error::Unsupported) if it is not compiled in, or this machine has none.
     pub fn open(self) -> Result<Opened> {
+        self.open_number(None)
+    }
+
+    /// The devices of these numbers, at least one. CUDA counts as `nvidia-smi -L` does, within `CUDA_VISIBLE_DEVICES`; wgpu counts graphics
+    /// cards, and 0 alone is whatever it prefers. A processor has as many as are asked for: shares of its threads.
+    ///
+    /// # Errors
+    /// As [`DeviceKind::open`], naming the number.
+    pub fn open_all(self, devices: &Devices) -> Result<Vec<Opened>> {
+        if *devices == Devices::default() {
+            return Ok(vec![self.open()?]);
+        }
+        devices.numbers().iter().map(|number| self.open_number(Some(*number))).collect()
+    }
+
+    #[cfg_attr(
+        not(any(feature = "wgpu", feature = "cuda")),
+        allow(unused_variables, reason = "processors have no numbers")
+    )]
+    fn open_number(self, number: Option<usize>) -> Result<Opened> {
         match self {
             Self::Flex => Ok(processor(Device::flex(), "flex")),
             #[cfg(feature = "ndarray")]
@@ -117,11 +140,11 @@ impl DeviceKind {
             #[cfg(not(feature = "ndarray"))]
             Self::Ndarray => Err(not_compiled_in("ndarray")),
             #[cfg(feature = "wgpu")]
-            Self::Wgpu => wgpu::open(),
+            Self::Wgpu => wgpu::open(number),
             #[cfg(not(feature = "wgpu"))]
             Self::Wgpu => Err(not_compiled_in("wgpu")),
             #[cfg(feature = "cuda")]
-            Self::Cuda => cuda::open(),
+            Self::Cuda => cuda::open(number.unwrap_or(0)),
             #[cfg(not(feature = "cuda"))]
             Self::Cuda => Err(not_compiled_in("cuda")),
         }

@@ -1,32 +1,43 @@
-//! The graphics device, opened once per process: Vulkan; on Windows DirectX 12 where there is no Vulkan, on macOS Metal.
+//! Graphics devices, each opened once per process: Vulkan; on Windows DirectX 12 where there is no Vulkan, on macOS Metal.
 
-use std::sync::OnceLock;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
-use burn::tensor::Device;
 use burn::tensor::wgpu::WgpuBackend;
 use burn::tensor::wgpu::wgpu::DeviceType;
+use burn::tensor::{Device, DeviceKind};
 
 use super::Opened;
 use crate::{Error, Result};
 
-/// The adapter that wgpu prefers; `CUBECL_WGPU_DEFAULT_DEVICE` (e.g. `IntegratedGpu(0)`) names another.
-pub(super) fn open() -> Result<Opened> {
+/// Graphics card `number`, from 0. Without one the adapter that wgpu prefers; `CUBECL_WGPU_DEFAULT_DEVICE` (e.g.
+/// `IntegratedGpu(0)`) names another.
+pub(super) fn open(number: Option<usize>) -> Result<Opened> {
+    type Found = Result<Opened, String>;
     // burn opens an adapter once; a second request would be refused
-    static OPENED: OnceLock<Result<Opened, String>> = OnceLock::new();
-    // elsewhere the choice would end at OpenGL, which nothing here was tried on
-    let api = if cfg!(any(windows, target_os = "macos")) { WgpuBackend::Auto } else { WgpuBackend::Vulkan };
-    let options = || Device::wgpu_options().graphics_api(api);
-    let opened = OPENED.get_or_init(|| match options().init_with_setup() {
-        Ok((device, setup)) => {
-            let info = setup.adapter.get_info();
-            Ok(Opened { device, name: info.name, software: info.device_type == DeviceType::Cpu })
-        }
-        Err(error) => Err(error.to_string()),
+    static OPENED: Mutex<BTreeMap<Option<usize>, Found>> = Mutex::new(BTreeMap::new());
+    let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
+    let found = opened.entry(number).or_insert_with(|| {
+        // elsewhere the choice would end at OpenGL, which nothing here was tried on
+        let api =
+            if cfg!(any(windows, target_os = "macos")) { WgpuBackend::Auto } else { WgpuBackend::Vulkan };
+        let options = Device::wgpu_options().graphics_api(api);
+        let options = match number {
+            Some(number) => options.device_kind(DeviceKind::DiscreteGpu(number)),
+            None => options,
+        };
+        let (device, setup) = options.init_with_setup().map_err(|error| error.to_string())?;
+        let info = setup.adapter.get_info();
+        Ok(Opened { device, name: info.name, software: info.device_type == DeviceType::Cpu })
     });
-    opened.clone().map_err(|cause| {
-        Error::unsupported(format!(
+    found.clone().map_err(|cause| match number {
+        Some(number) => Error::unsupported(format!(
+            "device wgpu: there is no graphics card number {number}, counted from 0 ({cause}): veni-cli inspect --devices \
+             lists adapters; name cards among them with --devices, or leave it out"
+        )),
+        None => Error::unsupported(format!(
             "device wgpu: there is no usable graphics adapter ({cause}): install a Vulkan driver (Mesa's, package \
              mesa-vulkan-drivers, also computes without a graphics card), or take device flex"
-        ))
+        )),
     })
 }

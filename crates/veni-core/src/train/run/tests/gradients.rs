@@ -34,10 +34,11 @@ fn gradients_match(run: &Path, config: TrainConfig) {
     let trainer = Trainer::create(run, config, "test").unwrap();
     let veni = trainer.network().clone();
     let batch = veni.source(trainer.config(), &trainer.splits.train).unwrap().prepare(1);
-    let loss_of = &trainer.stages[0].loss;
-    let value = |veni: &Network| veni.terms(&batch, loss_of, &trainer.device).total();
+    let device = DeviceKind::Flex.device().unwrap().autodiff();
+    let loss_of = &Network::loss(trainer.config(), &device);
+    let value = |veni: &Network| veni.terms(&batch, loss_of, &device).total();
     let both = [DecoderBy::Tensors, DecoderBy::Kernels].map(|by| {
-        let (terms, gradients) = veni.gradients(&batch, loss_of, by, &trainer.device);
+        let (terms, gradients) = veni.gradients(&batch, loss_of, by, &device);
         (terms.total().into_scalar::<f32>(), weights::gradients(&veni, "", &gradients))
     });
     let [(loss, gradients), (kernel_loss, by_kernels)] = both;
@@ -82,41 +83,42 @@ fn gradients_match(run: &Path, config: TrainConfig) {
     );
 }
 
-/// The losses are means over the batch: in how many parts it is computed changes nothing but rounding.
+/// The losses are means over the batch: in how many parts it is computed, on one device or on several, changes nothing but
+/// rounding.
 #[test]
-fn accumulated_gradients_are_those_of_the_whole_batch() {
+fn gradients_of_parts_are_those_of_the_whole_batch() {
     let (folder, mut config) = setup(1);
-    config.batch = 4;
+    config.batch = 5;
     config.loss.log_mse = WeightSchedule::Constant(0.3);
     config.loss.hdr_mse = WeightSchedule::Constant(0.3);
     for form in [LossForm::Corrected, LossForm::Reference] {
         config.loss.form = form;
-        let computed = |accumulate: usize, batch: usize| {
+        let computed = |devices: usize, accumulate: usize, batch: usize| {
             let mut config = config.clone();
             (config.accumulate, config.batch) = (accumulate, batch);
-            let out = folder.path().join(format!("{form:?}-{accumulate}-{batch}"));
+            config.devices = Devices::first(devices);
+            let out = folder.path().join(format!("{form:?}-{devices}-{accumulate}-{batch}"));
             let trainer = Trainer::create(&out, config, "test").unwrap();
-            let running = &trainer.stages[0];
-            let source = trainer.network.source(&running.stage.config, &trainer.splits.train).unwrap();
-            trainer.gradients(&running.stage, &running.loss, source.prepare(1))
+            let source = trainer.network().source(trainer.config(), &trainer.splits.train).unwrap();
+            trainer.replicas.gradients(source.prepare(1), accumulate)
         };
-        let whole = computed(1, 4);
-        for parts in [2, 4] {
-            let sum = computed(parts, 4);
+        let whole = computed(1, 1, 5);
+        for parts in [[1, 2], [1, 5], [2, 1], [5, 1], [2, 2]] {
+            let sum = computed(parts[0], parts[1], 5);
             assert_eq!(sum.parts.len(), whole.parts.len());
             for (name, value) in &whole.parts {
                 // a mean whose largest terms are a sun's rounds at 1.5e-5
                 let other = sum.parts[name];
                 assert!(
                     (other - value).abs() < 1e-4 * value,
-                    "{form:?}, {parts} parts, {name}: {other} {value}"
+                    "{form:?}, {parts:?} parts, {name}: {other} {value}"
                 );
             }
             let distance = distance(&sum, &whole);
-            assert!(distance < 1e-4, "{form:?}, {parts} parts: {distance}");
+            assert!(distance < 1e-4, "{form:?}, {parts:?} parts: {distance}");
         }
-        // half of the batch is something else
-        assert!(distance(&computed(1, 2), &whole) > 1e-2);
+        // a batch that lacks a part is something else
+        assert!(distance(&computed(1, 1, 4), &whole) > 1e-2);
     }
 }
 

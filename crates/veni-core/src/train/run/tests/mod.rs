@@ -13,7 +13,7 @@ use crate::latent::Latent;
 use crate::model::Model;
 use crate::panorama::{Panorama, Precision, WriteFormat, WriteOptions};
 use crate::sphere::Equirect;
-use crate::train::config::DecoderBy;
+use crate::train::config::{DecoderBy, DeviceKind, Devices};
 use crate::train::loss::LossForm;
 use crate::train::presets::Preset;
 use crate::train::schedule::{LearningRate, WeightSchedule};

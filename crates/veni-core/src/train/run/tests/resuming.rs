@@ -13,6 +13,14 @@ fn an_auto_decoder_continues_to_the_bit_too() {
     continues_to_the_bit(config, &["latents.safetensors"]);
 }
 
+/// Who computes its part of a batch first changes nothing.
+#[test]
+fn a_run_on_two_devices_continues_to_the_bit_too() {
+    let mut config = Preset::Tiny.config(3);
+    config.devices = Devices::first(2);
+    continues_to_the_bit(config, &[]);
+}
+
 fn continues_to_the_bit(config: TrainConfig, more: &[&str]) {
     let (folder, mut config) = setup_of(config, 4);
     let original = config.clone();
