@@ -73,6 +73,9 @@ fn every_preset_and_objective_runs_and_seeds_name_starts() {
     for objective in ["log", "absolute", "display", "reference", "cosine-scale", "training"] {
         loss(&["--objective", objective]);
     }
+    let lit = |share: &str| loss(&["--preset", "energy", "--share", share]);
+    assert!(lit("0.05") == loss(&["--objective", "energy"]) && lit("0.05") != lit("0.2"));
+    assert_eq!(lit("0"), loss(&[]));
     let by = |method: &str| loss(&["--method", method]);
     assert!(by("auto") == by("levenberg-marquardt") && by("auto") != by("adam"));
     let noise = |seed: &str| loss(&["--start", "noise", "--seed", seed]);
@@ -203,6 +206,8 @@ fn what_cannot_be_fitted_is_refused_before_any_work() {
     refused(&[&sky, "-o", "a.json", "--uncertainty", "u.exr", "--steps", "1"], &["--starts"]);
     refused(&[&sky, "-o", "a.json", "--completed", "c.exr", "--size", "8x8"], &["--size 8x8"]);
     refused(&[&sky, "--prior=-1"], &["prior = -1"]);
+    refused(&[&sky, "--share", "0.1"], &["--share", "--preset energy"]);
+    refused(&[&sky, "--preset", "energy", "--share", "2"], &["share = 2", "0..=1"]);
     refused(&[&sky, "--resolution", "32x32"], &["--resolution"]);
     let marquardt = ["--method", "levenberg-marquardt"];
     refused(&[&[sky.as_str(), "--rate", "0.1"][..], &marquardt].concat(), &["--rate", "adam"]);

@@ -2,6 +2,7 @@
 //!
 //! Most need the learning world. What does not also runs alone: `cargo test -p veni-cli --no-default-features --test cli`.
 
+mod avif;
 #[cfg(feature = "learn")]
 mod bad_input;
 #[cfg(feature = "learn")]

@@ -80,7 +80,8 @@ fn look(model: &Model, image: &[f32], factor: usize, share: f64) -> Result<Look>
     let target =
         FitTarget { prior: Some(&prior), ..FitTarget::panoramas(coarse_grid(GRID, factor), &images) };
     let objective = if share > 0.0 { Objective::Energy { share } } else { Objective::LogError };
-    let config = FitConfig { objective, ..FitConfig::thorough() };
+    let prior_weight = FitConfig::prior_for(start[0].vectors.len());
+    let config = FitConfig { objective, prior: prior_weight, ..FitConfig::thorough() };
     let found = fit(FitDecoder::from(&decoder), &target, &start, &config)?;
     let mut decoded = vec![[0.0; 3]; GRID.len()];
     decoder.condition(&found.latents[0])?.log_radiance_batch(&GRID.directions(), &mut decoded);

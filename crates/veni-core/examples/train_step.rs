@@ -40,6 +40,10 @@ fn main() -> Result<()> {
     let steps: u64 = steps.parse().map_err(|_| usage())?;
     let mut config = preset.config(latent_vectors).with_overrides(overrides)?;
     config.data.folders = vec![PathBuf::from(data)];
+    if !overrides.iter().any(|text| text.starts_with("devices=")) {
+        // as `veni-cli train` does
+        config.share_threads(rayon::current_num_threads());
+    }
     config.check()?;
 
     let splits = Splits::open(&config.data, config.seed)?;

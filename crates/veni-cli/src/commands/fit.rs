@@ -208,9 +208,9 @@ impl Fit {
         let partial = observation.is_partial();
         let starts = self.starts(path, &observation, subject)?;
         self.check_starts(starts.len())?;
-        let config = self.settings.adapted(*config, partial);
-        let (total, prior) =
-            (config.most_updates(subject.latent_vectors()) * starts.len() as u64, subject.prior());
+        let vectors = subject.latent_vectors();
+        let config = self.settings.adapted(*config, partial, vectors);
+        let (total, prior) = (config.most_updates(vectors) * starts.len() as u64, subject.prior());
         let mut progress = Progress::start(report, "step", 0, total);
         let best = observation.with_target(|target| {
             let target = FitTarget { prior: Some(&prior), ..target.clone() };

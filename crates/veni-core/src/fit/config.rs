@@ -50,7 +50,7 @@ pub enum Method {
 
 /// [`Objective::Energy`]'s share by default: docs/RESULTS.md, Where the light comes from.
 const SHARE: f64 = 0.05;
-/// Most latent vectors that [`Method::Auto`] fits without exploring.
+/// Most latent vectors of a small code, which [`Method::Auto`] fits without exploring.
 const FEW: usize = 16;
 /// Updates of Levenberg–Marquardt after exploring.
 const POLISH: u64 = 60;
@@ -124,6 +124,12 @@ impl FitConfig {
             free_exposure: false,
             plateau: None,
         }
+    }
+
+    /// The weight of the prior for a whole panorama: 1e-4, and 1e-5 for more than 16 vectors, whose prior, the Gaussian of a
+    /// few thousand training codes, is narrow in directions that other panoramas need (docs/DECISIONS.md, Fitting).
+    pub fn prior_for(vectors: usize) -> f64 {
+        if vectors > FEW { 1e-5 } else { 1e-4 }
     }
 
     /// As [`FitConfig::thorough`], for what a screen shows under the image's own white.

@@ -40,8 +40,13 @@ pub(super) struct Settings {
     #[arg(long, value_name = "RATE[:LAST]", value_parser = rate)]
     rate: Option<(f64, Option<f64>)>,
 
-    /// Weight of the model's prior over latents; 0 turns it off [default: the preset's, or 0.02 where part of the
-    /// sphere is unknown]
+    /// Part of the weight that goes by light, 0 to 1, with the objective energy: the more, the better suns and lamps and
+    /// the worse everything else [default: 0.05]
+    #[arg(long, value_name = "PART")]
+    share: Option<f64>,
+
+    /// Weight of the model's prior over latents; 0 turns it off [default: 0.0001, 0.00001 for more than 16 vectors, and
+    /// 0.02 where part of the sphere is unknown; with the articles' presets 0]
     #[arg(long, value_name = "WEIGHT")]
     prior: Option<f64>,
 
@@ -97,7 +102,7 @@ enum ObjectiveName {
     Absolute,
     /// Squared error of tonemapped values
     Display,
-    /// Squared error of log radiance, by solid angle and (5 %) by the light that comes from there
+    /// Squared error of log radiance, by solid angle and (--share) by the light that comes from there
     Energy,
     /// Squared error of log radiance, every pixel alike
     Reference,
@@ -185,6 +190,15 @@ impl Settings {
                 ObjectiveName::Training => Objective::Terms(LossConfig::default()),
             };
         }
+        match (self.share, &mut config.objective) {
+            (Some(part), Objective::Energy { share }) => *share = part,
+            (Some(_), _) => {
+                bail!(
+                    "--share: only the objective energy weighs by light; add --preset energy, or leave it out"
+                )
+            }
+            (None, _) => {}
+        }
         if let Some(weight) = self.prior {
             config.prior = weight;
         }
@@ -195,10 +209,11 @@ impl Settings {
         Ok(config)
     }
 
-    /// What depends on whether part of the sphere is unknown.
-    pub(super) fn adapted(&self, config: FitConfig, partial: bool) -> FitConfig {
+    /// What depends on whether part of the sphere is unknown, and on the latent's number of vectors.
+    pub(super) fn adapted(&self, config: FitConfig, partial: bool, vectors: usize) -> FitConfig {
         let prior = match (self.prior, self.preset) {
             (None, Preset::Thorough | Preset::Display | Preset::Energy) if partial => PRIOR,
+            (None, Preset::Thorough | Preset::Display | Preset::Energy) => FitConfig::prior_for(vectors),
             _ => config.prior,
         };
         let free_exposure = self.exposure.map_or(partial, |e| e == Exposure::Free);

@@ -1,4 +1,4 @@
-//! Panoramas of limited range: PNG, JPEG and WebP, as the display values that are stored.
+//! Panoramas of limited range: PNG, JPEG, WebP and AVIF, as the display values that are stored.
 
 use std::io::{Read, Seek};
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
-use super::{LDR, ReadOptions, first_bytes, open, unknown};
+use super::{LDR, ReadOptions, first_bytes, open, stands, unknown};
 use crate::panorama::Panorama;
 use crate::panorama::tonemap::srgb_to_linear;
 use crate::sphere::Equirect;
@@ -19,7 +19,7 @@ use crate::{Error, Result};
 pub struct LdrPanorama {
     grid: Equirect,
     values: Vec<[f32; 3]>,
-    transparent: f64,
+    pub(super) transparent: f64,
 }
 
 /// How display values become linear ones.
@@ -64,7 +64,7 @@ impl LdrPanorama {
         start.map(|s| format(&s).is_some()).map_err(|e| e.in_file(path))
     }
 
-    /// Reads a PNG, JPEG or WebP file; see [`LdrPanorama::read_with`].
+    /// Reads a PNG, JPEG, WebP or (feature `avif`) AVIF file; see [`LdrPanorama::read_with`].
     ///
     /// # Errors
     /// As [`LdrPanorama::read_with`].
@@ -72,8 +72,8 @@ impl LdrPanorama {
         Self::read_with(path, &ReadOptions::default())
     }
 
-    /// Reads a PNG, JPEG or WebP file of 8 or 16 bits, grey or coloured, turned upright where its EXIF data says
-    /// so; the content decides the format, not the name. Alpha hides nothing (see [`LdrPanorama::transparent`]);
+    /// Reads a PNG, JPEG or WebP file of 8 or 16 bits, or an AVIF file (feature `avif`) of 8 to 12, grey or coloured, turned
+    /// upright where its EXIF data says so (AVIF that is to be turned is refused); the content decides the format, not the name. Alpha hides nothing (see [`LdrPanorama::transparent`]);
     /// colour profiles are not applied: values are taken for Rec. 709 primaries.
     ///
     /// # Errors
@@ -107,7 +107,7 @@ impl LdrPanorama {
 
 /// The format that these first bytes begin, with its name.
 fn format(start: &[u8]) -> Option<(ImageFormat, &'static str)> {
-    let (_, format, name) = LDR.iter().find(|(magic, ..)| start.starts_with(magic))?;
+    let (.., format, name) = LDR.iter().find(|(at, magic, ..)| stands(start, *at, magic))?;
     // RIFF holds sound and video too
     let is_image = *format != ImageFormat::WebP || start.get(8..12) == Some(b"WEBP");
     is_image.then_some((*format, *name))
@@ -117,8 +117,12 @@ fn decode(path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
     let mut file = open(path)?;
     let start = first_bytes(&mut file, path)?;
     let Some((format, name)) = format(&start) else {
-        return Err(unknown(&start, "neither a PNG, a JPEG nor a WebP file"));
+        return Err(unknown(&start, "neither a PNG, a JPEG, a WebP nor an AVIF file"));
     };
+    #[cfg(feature = "avif")]
+    if format == ImageFormat::Avif {
+        return super::avif::read(file, path, options);
+    }
     let wrap = |error: ImageError| match error {
         ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
             Error::invalid(format!("truncated {name} file"))

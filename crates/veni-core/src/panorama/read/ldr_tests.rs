@@ -114,14 +114,21 @@ fn damaged_oversized_and_foreign_files_are_refused() {
     whole[29..33].copy_from_slice(&checksum.to_be_bytes());
     refused("huge.png", &whole, &["46342 × 23171", "limit"]);
     refused("wide.png", &png(6, 2), &["6 × 2", "twice"]);
-    refused("a.avif", b"\0\0\0\x20ftypavif\0\0\0\0mif1", &["AVIF", "convert"]);
+    refused("b.avif", b"\0\0\0\x20ftypavis\0\0\0\0mif1", &["Animated AVIF", "convert"]);
     refused("a.tif", b"II*\0rest of it", &["TIFF", "convert"]);
     refused("a.wav", b"RIFF\0\0\0\0WAVEfmt ", &["neither"]);
     refused("nothing", b"", &["empty"]);
     assert!(LdrPanorama::read(folder.path()).unwrap_err().to_string().contains("folder"));
-    assert!(!LdrPanorama::recognise(folder.path().join("a.avif")).unwrap());
-    let error = Panorama::read(folder.path().join("a.avif")).unwrap_err().to_string();
+    assert!(!LdrPanorama::recognise(folder.path().join("b.avif")).unwrap());
+    let error = Panorama::read(folder.path().join("b.avif")).unwrap_err().to_string();
     assert!(error.contains("AVIF") && error.contains("convert"), "{error}");
+    if cfg!(not(feature = "avif")) {
+        refused(
+            "a.avif",
+            b"\0\0\0\x20ftypavif\0\0\0\0mif1",
+            &["built without --features avif", "AVIF", "convert"],
+        );
+    }
 }
 
 fn png(width: u32, height: u32) -> Vec<u8> {

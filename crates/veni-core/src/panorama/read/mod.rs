@@ -1,5 +1,7 @@
 //! Reading: which format a file is, and the limits that its header must meet before pixels are allocated.
 
+#[cfg(feature = "avif")]
+mod avif;
 mod exr;
 mod hdr;
 mod ldr;
@@ -147,17 +149,20 @@ enum Kind {
     Hdr { strict: bool },
 }
 
-/// Formats of limited range that [`LdrPanorama::read`] reads, by their first bytes.
-const LDR: [(&[u8], ImageFormat, &str); 3] = [
-    (b"\x89PNG", ImageFormat::Png, "PNG"),
-    (b"\xFF\xD8\xFF", ImageFormat::Jpeg, "JPEG"),
-    (b"RIFF", ImageFormat::WebP, "WebP"),
+/// Formats of limited range that [`LdrPanorama::read`] reads: where the name of each stands.
+const LDR: &[(usize, &[u8], ImageFormat, &str)] = &[
+    (0, b"\x89PNG", ImageFormat::Png, "PNG"),
+    (0, b"\xFF\xD8\xFF", ImageFormat::Jpeg, "JPEG"),
+    (0, b"RIFF", ImageFormat::WebP, "WebP"),
+    #[cfg(feature = "avif")]
+    (4, b"ftypavif", ImageFormat::Avif, "AVIF"),
 ];
 
-/// Formats that nothing here reads: where the name of each stands, and what to convert it to.
+/// Formats that are not read: where the name of each stands.
 const FOREIGN: [(usize, &[u8], &str); 7] = [
-    (4, b"ftypavif", "AVIF"),
-    (4, b"ftypavis", "AVIF"),
+    // with the feature `avif` found before
+    (4, b"ftypavif", "(built without --features avif) AVIF"),
+    (4, b"ftypavis", "Animated AVIF"),
     (4, b"ftypheic", "HEIF"),
     (0, b"BM", "BMP"),
     (0, b"GIF8", "GIF"),
@@ -182,7 +187,7 @@ fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
     if start.starts_with(b"#?") {
         return Ok(Kind::Hdr { strict: start.starts_with(b"#?RADIANCE") });
     }
-    if let Some((_, _, name)) = LDR.iter().find(|(magic, ..)| start.starts_with(magic)) {
+    if let Some((.., name)) = LDR.iter().find(|(at, magic, ..)| stands(&start, *at, magic)) {
         return Err(Error::unsupported(format!(
             "{name} holds no high dynamic range; `veni-cli prepare` expands such panoramas into EXR files first"
         )));
@@ -190,12 +195,17 @@ fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
     Err(unknown(&start, "neither an OpenEXR nor a Radiance .hdr file"))
 }
 
+/// Whether a name stands at a place.
+fn stands(start: &[u8], at: usize, name: &[u8]) -> bool {
+    start.get(at..).is_some_and(|start| start.starts_with(name))
+}
+
 /// The error for content that is none of the formats looked for.
 fn unknown(start: &[u8], otherwise: &str) -> Error {
     if start.is_empty() {
         return Error::invalid("the file is empty");
     }
-    match FOREIGN.iter().find(|(at, magic, _)| start.get(*at..).is_some_and(|s| s.starts_with(magic))) {
+    match FOREIGN.iter().find(|(at, magic, _)| stands(start, *at, magic)) {
         Some((.., name)) => Error::unsupported(format!(
             "{name} images are not read; convert it to EXR, or to PNG if it holds no high dynamic range"
         )),

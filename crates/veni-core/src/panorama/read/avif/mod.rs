@@ -1,0 +1,111 @@
+//! AVIF (feature `avif`): boxes by avif-parse, the AV1 frame by rav1d, from there to display values.
+//!
+//! Boxes: ISO/IEC 14496-12 and 23008-12. Colour code points and Y′CbCr: ITU-T H.273; what an `nclx` box says goes before what
+//! the AV1 stream says, and an unspecified matrix is that of BT.601.
+
+mod frame;
+#[cfg(test)]
+mod tests;
+
+use std::io::Read;
+use std::path::Path;
+
+use avif_parse::AvifData;
+
+use super::{LdrPanorama, ReadOptions};
+use crate::{Error, Result};
+use frame::Frame;
+
+/// Code points of H.273 for what display values mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Coding {
+    transfer: u8,
+    matrix: u8,
+    full_range: bool,
+}
+
+pub(super) fn read(mut file: impl Read, path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
+    let data = AvifData::from_reader(&mut bytes.as_slice()).map_err(wrap)?;
+    let header = data.primary_item_metadata().map_err(wrap)?;
+    let size = [header.max_frame_width, header.max_frame_height].map(|n| n.get() as usize);
+    let grid = options.check(size[0], size[1])?;
+    let properties = properties(&bytes);
+    refuse_transformed(properties)?;
+
+    let limit = u32::try_from(options.max_pixels).unwrap_or(u32::MAX);
+    let colour = Frame::decode(&data.primary_item, limit)?;
+    let coding = nclx(properties).unwrap_or_else(|| colour.coding());
+    refuse_other_curves(coding.transfer)?;
+    if colour.size() != size {
+        return Err(Error::invalid("damaged AVIF file: the picture is not as large as its header says"));
+    }
+    let mut panorama = LdrPanorama::new(grid, colour.rgb(coding)?);
+    if let Some(alpha) = &data.alpha_item {
+        let alpha = Frame::decode(alpha, limit)?;
+        if alpha.size() != size {
+            return Err(Error::invalid("damaged AVIF file: its alpha is not as large as the picture"));
+        }
+        panorama.transparent = alpha.share_below_half();
+    }
+    Ok(panorama)
+}
+
+fn wrap(error: avif_parse::Error) -> Error {
+    match error {
+        avif_parse::Error::Unsupported(what) => {
+            Error::unsupported(format!("AVIF: {what}; convert it to PNG first"))
+        }
+        other => Error::invalid(format!("damaged or truncated AVIF file: {other}")),
+    }
+}
+
+/// The `meta` box, which holds all properties; nothing where there is none.
+fn properties(mut bytes: &[u8]) -> &[u8] {
+    while let Some((&[a, b, c, d, ref name @ ..], _)) = bytes.split_first_chunk::<8>() {
+        let size = u32::from_be_bytes([a, b, c, d]) as usize;
+        // 0: up to the end; 1: a size of 64 bits follows, which no box before or at `meta` needs
+        let size = if size == 0 { bytes.len() } else { size.max(8) };
+        if name == b"meta" {
+            return &bytes[8..size.min(bytes.len())];
+        }
+        bytes = bytes.get(size..).unwrap_or_default();
+    }
+    &[]
+}
+
+/// What follows a property's name.
+fn after<'a>(properties: &'a [u8], name: &[u8]) -> Option<&'a [u8]> {
+    let at = properties.windows(name.len()).position(|window| window == name)?;
+    Some(&properties[at + name.len()..])
+}
+
+fn nclx(properties: &[u8]) -> Option<Coding> {
+    let &[_, _, _, transfer, _, matrix, range] = after(properties, b"colrnclx")?.first_chunk()?;
+    Some(Coding { transfer, matrix, full_range: range & 0x80 != 0 })
+}
+
+fn refuse_transformed(properties: &[u8]) -> Result<()> {
+    let turned = after(properties, b"irot").and_then(<[u8]>::first).is_some_and(|turns| turns & 3 != 0);
+    let named = [(turned, "turned"), (after(properties, b"imir").is_some(), "mirrored")];
+    let cut = (after(properties, b"clap").is_some(), "cut");
+    match named.into_iter().chain([cut]).find(|(there, _)| *there) {
+        Some((_, how)) => Err(Error::unsupported(format!(
+            "AVIF that is to be {how} before it is shown is not read; save it as it is shown, or as PNG"
+        ))),
+        None => Ok(()),
+    }
+}
+
+fn refuse_other_curves(transfer: u8) -> Result<()> {
+    let name = match transfer {
+        // BT.709, unspecified, BT.601, sRGB, BT.2020: curves so close that all of them are taken for sRGB
+        1 | 2 | 6 | 13..=15 => return Ok(()),
+        8 => "linear".to_owned(),
+        16 => "PQ (high dynamic range)".to_owned(),
+        18 => "HLG (high dynamic range)".to_owned(),
+        other => format!("transfer characteristic {other} of H.273"),
+    };
+    Err(Error::unsupported(format!("AVIF with values in {name} is not read; convert it to EXR")))
+}
