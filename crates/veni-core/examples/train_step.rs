@@ -72,7 +72,7 @@ fn main() -> Result<()> {
         let configured = config.groups();
         let rates: Vec<_> = configured.iter().map(|(_, g)| g.learning_rate.at(step - 1)).collect();
         optimiser.update(&computed.gradients, &rates);
-        replicas.write(&optimiser.weights())?;
+        replicas.write(optimiser.weights())?;
         seconds.push(clock.elapsed().as_secs_f64());
     }
     if let Some(loss) = losses.iter().find(|loss| !loss.is_finite()) {

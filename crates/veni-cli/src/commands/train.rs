@@ -14,7 +14,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use veni_core::data::Fold;
 use veni_core::model::ModelKind;
-use veni_core::train::config::{DecoderBy, DeviceKind, Devices, TrainConfig};
+use veni_core::train::config::{DeviceKind, Devices, TrainConfig};
 use veni_core::train::init::Initialised;
 use veni_core::train::presets::Preset;
 use veni_core::train::run::{Finish, Trainer};
@@ -306,7 +306,7 @@ impl Train {
 /// What the graphics devices are, and what about them will be slow.
 fn note_device(config: &TrainConfig, report: Report) -> Result<()> {
     let kind = config.device;
-    if kind.decoder_by() == DecoderBy::Kernels {
+    if kind.is_processor() {
         return Ok(());
     }
     for opened in kind.open_all(&config.devices)? {

@@ -67,13 +67,14 @@ pub struct Optimiser {
     groups: Vec<Group>,
     ema_decay: f64,
     updates: u64,
+    weights: Weights,
+    /// What belongs to each weight, under its path.
     slots: std::collections::BTreeMap<String, Slot>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 struct Slot {
     group: usize,
-    weight: Weight,
     first: Vec<f32>,
     second: Vec<f32>,
     average: Vec<f32>,
@@ -88,17 +89,18 @@ impl Optimiser {
     /// # Errors
     /// [`Error::Invalid`] if a parameter belongs to no group.
     pub fn new<M: Module>(module: &M, groups: Vec<Group>, ema_decay: f64) -> Result<Self> {
+        let weights = weights::read(module, "");
         let mut slots = std::collections::BTreeMap::new();
-        for (path, weight) in weights::read(module, "") {
+        for (path, weight) in &weights {
             let inside = |g: &Group| path.strip_prefix(&g.prefix).is_some_and(|rest| rest.starts_with('.'));
             let group = groups.iter().position(inside);
             let group =
                 group.ok_or_else(|| Error::invalid(format!("parameter {path} is in no optimiser group")))?;
             let zeros = vec![0.0; weight.data.len()];
             let average = weight.data.clone();
-            slots.insert(path, Slot { group, weight, first: zeros.clone(), second: zeros, average });
+            slots.insert(path.clone(), Slot { group, first: zeros.clone(), second: zeros, average });
         }
-        Ok(Self { groups, ema_decay, updates: 0, slots })
+        Ok(Self { groups, ema_decay, updates: 0, weights, slots })
     }
 
     /// Other constants for the groups, whose parameters stay.
@@ -128,7 +130,7 @@ impl Optimiser {
     ) -> (M, Vec<GroupReport>) {
         let reports = self.update(&weights::gradients(&module, "", grads), learning_rates);
         let module =
-            weights::write(module, "", &self.weights()).expect("the module that the state was made for");
+            weights::write(module, "", self.weights()).expect("the module that the state was made for");
         (module, reports)
     }
 
@@ -144,9 +146,9 @@ impl Optimiser {
         let rules: Vec<_> = (self.groups.iter().zip(learning_rates).zip(&norms))
             .map(|((group, &rate), &norm)| Rule::new(&group.adam, rate, norm, self.updates, average_decay))
             .collect();
-        for (path, slot) in &mut self.slots {
+        for ((path, slot), weight) in self.slots.iter_mut().zip(self.weights.values_mut()) {
             if let Some(gradient) = grads.get(path) {
-                slot.update(&gradient.data, &rules[slot.group]);
+                slot.update(&mut weight.data, &gradient.data, &rules[slot.group]);
             }
         }
         let reports = norms.iter().zip(learning_rates);
@@ -154,27 +156,26 @@ impl Optimiser {
     }
 
     /// Current weights.
-    pub fn weights(&self) -> Weights {
-        self.slots.iter().map(|(path, slot)| (path.clone(), slot.weight.clone())).collect()
+    pub fn weights(&self) -> &Weights {
+        &self.weights
     }
 
     /// Averaged weights.
     pub fn averages(&self) -> Weights {
-        let average = |slot: &Slot| Weight { shape: slot.weight.shape.clone(), data: slot.average.clone() };
-        self.slots.iter().map(|(path, slot)| (path.clone(), average(slot))).collect()
+        let average = |(path, weight): (&String, &Weight)| {
+            let data = self.slots[path].average.clone();
+            (path.clone(), Weight { shape: weight.shape.clone(), data })
+        };
+        self.weights.iter().map(average).collect()
     }
 
     /// Everything, for a checkpoint: `weight.*`, `first.*`, `second.*`, `average.*`.
     pub fn state(&self) -> Weights {
         let mut out = Weights::new();
-        for (path, slot) in &self.slots {
-            for (part, data) in
-                PARTS.iter().zip([&slot.weight.data, &slot.first, &slot.second, &slot.average])
-            {
-                out.insert(
-                    format!("{part}.{path}"),
-                    Weight { shape: slot.weight.shape.clone(), data: data.clone() },
-                );
+        for ((path, slot), weight) in self.slots.iter().zip(self.weights.values()) {
+            for (part, data) in PARTS.iter().zip([&weight.data, &slot.first, &slot.second, &slot.average]) {
+                let stored = Weight { shape: weight.shape.clone(), data: data.clone() };
+                out.insert(format!("{part}.{path}"), stored);
             }
         }
         out
@@ -185,16 +186,16 @@ impl Optimiser {
     /// # Errors
     /// [`Error::Invalid`] naming a tensor that is missing, superfluous or of another shape.
     pub fn restore(&mut self, mut state: Weights, updates: u64) -> Result<()> {
-        for (path, slot) in &mut self.slots {
-            let targets = [&mut slot.weight.data, &mut slot.first, &mut slot.second, &mut slot.average];
+        for ((path, slot), weight) in self.slots.iter_mut().zip(self.weights.values_mut()) {
+            let targets = [&mut weight.data, &mut slot.first, &mut slot.second, &mut slot.average];
             for (part, target) in PARTS.iter().zip(targets) {
                 let name = format!("{part}.{path}");
                 let found =
                     state.remove(&name).ok_or_else(|| Error::invalid(format!("tensor {name} is missing")))?;
-                if found.shape != slot.weight.shape {
+                if found.shape != weight.shape {
                     return Err(Error::invalid(format!(
                         "tensor {name} has shape {:?}, the model needs {:?}",
-                        found.shape, slot.weight.shape
+                        found.shape, weight.shape
                     )));
                 }
                 *target = found.data;
@@ -210,11 +211,29 @@ impl Optimiser {
     fn norms(&self, grads: &Weights) -> Vec<f64> {
         let mut squares = vec![0.0; self.groups.len()];
         for (path, gradient) in grads {
-            let sum: f64 = gradient.data.iter().map(|&g| f64::from(g) * f64::from(g)).sum();
-            squares[self.slots[path].group] += sum;
+            squares[self.slots[path].group] += square_sum(&gradient.data);
         }
         squares.into_iter().map(f64::sqrt).collect()
     }
+}
+
+/// Numbers that one thread takes on at a time.
+const PIECE: usize = 1 << 16;
+
+/// Σ g², in an order that does not depend on the threads.
+fn square_sum(values: &[f32]) -> f64 {
+    const LANES: usize = 8;
+    let piece = |values: &[f32]| {
+        let (rows, rest) = values.as_chunks::<LANES>();
+        let mut lanes = [0.0; LANES];
+        for row in rows {
+            for (lane, g) in lanes.iter_mut().zip(row) {
+                *lane += f64::from(*g) * f64::from(*g);
+            }
+        }
+        lanes.iter().sum::<f64>() + rest.iter().map(|g| f64::from(*g) * f64::from(*g)).sum::<f64>()
+    };
+    values.par_chunks(PIECE).map(piece).collect::<Vec<_>>().into_iter().sum()
 }
 
 /// The scalars of one update of one group.
@@ -248,10 +267,9 @@ impl Rule {
 }
 
 impl Slot {
-    fn update(&mut self, gradient: &[f32], rule: &Rule) {
+    fn update(&mut self, weights: &mut [f32], gradient: &[f32], rule: &Rule) {
         // elementwise, so cutting it into pieces for the threads cannot change a bit
-        const PIECE: usize = 1 << 16;
-        let weights = self.weight.data.par_chunks_mut(PIECE);
+        let weights = weights.par_chunks_mut(PIECE);
         let moments = self.first.par_chunks_mut(PIECE).zip(self.second.par_chunks_mut(PIECE));
         let rest = self.average.par_chunks_mut(PIECE).zip(gradient.par_chunks(PIECE));
         weights.zip(moments).zip(rest).for_each(|((w, (m, v)), (e, g))| {

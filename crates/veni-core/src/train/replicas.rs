@@ -53,11 +53,8 @@ impl Replicas {
     /// As [`Network::new`]; [`Error::Unsupported`] if threads cannot be started.
     pub fn new(network: Network, config: &TrainConfig, devices: &[Device]) -> Result<Self> {
         let by = config.decoder_by;
-        let on_processor = config.device.decoder_by().is_kernels();
-        let count = match on_processor || by.is_kernels() {
-            true => (rayon::current_num_threads() / devices.len()).max(1),
-            false => 1,
-        };
+        let threaded = config.device.is_processor() || by.is_kernels();
+        let count = if threaded { (rayon::current_num_threads() / devices.len()).max(1) } else { 1 };
         let threads = |at: usize| {
             let named = move |n| format!("replica {at}, {n}");
             let pool = ThreadPoolBuilder::new().num_threads(count).thread_name(named).build();

@@ -189,7 +189,7 @@ impl Trainer {
         let configured = stage.config.groups();
         let rates: Vec<_> = configured.iter().map(|(_, group)| group.learning_rate.at(local - 1)).collect();
         let groups = self.optimiser.update(&gradients, &rates);
-        self.replicas.write(&self.optimiser.weights())?;
+        self.replicas.write(self.optimiser.weights())?;
         let seconds = clock.elapsed().as_secs_f64();
         let by_name = |f: &dyn Fn(usize) -> f64| {
             configured.iter().enumerate().map(|(i, (name, _))| (*name, f(i))).collect()

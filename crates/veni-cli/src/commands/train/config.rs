@@ -42,7 +42,7 @@ impl Train {
             config.set_device(device.into());
         }
         if self.mixed_precision {
-            if !config.device.decoder_by().is_kernels() {
+            if !config.device.is_processor() {
                 bail!(
                     "--mixed-precision: the decoder is computed by tensor operations on this device; it is for --device \
                      flex and ndarray"

@@ -148,7 +148,7 @@ impl TrainConfig {
     /// On a processor as many devices, each with its share of `threads`, as divide every batch evenly: one where there
     /// is but one thread, and of auto-decoders, whose batches are not shared. A graphics device stays one.
     pub fn share_threads(&mut self, threads: usize) {
-        let processor = self.device.decoder_by().is_kernels() && self.latents.is_none();
+        let processor = self.device.is_processor() && self.latents.is_none();
         let stages = self.stages().unwrap_or_default();
         let batches = || stages.iter().map(|stage| stage.config.batch / stage.config.accumulate.max(1));
         let fits = |count: &usize| batches().all(|batch| batch.is_multiple_of(*count));

@@ -82,12 +82,12 @@ fn restored_state_continues_to_the_bit() {
     run(toy(), &mut first, 2);
     let mut second = Optimiser::new(&toy(), groups(), 0.9).unwrap();
     second.restore(first.state(), first.updates()).unwrap();
-    let module = weights::write(toy(), "", &second.weights()).unwrap();
+    let module = weights::write(toy(), "", second.weights()).unwrap();
     run(module, &mut second, 2);
     assert_eq!(straight, second);
     // and the average is neither the start nor the end
     let averages = straight.averages();
-    assert_ne!(averages, straight.weights());
+    assert_ne!(averages, *straight.weights());
 }
 
 #[test]

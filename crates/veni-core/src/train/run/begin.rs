@@ -91,7 +91,7 @@ impl Trainer {
         trainer.make_folders()?;
         if let Some((state, info)) = state {
             trainer.optimiser.restore(state, info.step).map_err(|e| e.in_file(&path))?;
-            trainer.replicas.write(&trainer.optimiser.weights())?;
+            trainer.replicas.write(trainer.optimiser.weights())?;
             trainer.best = info.best;
         }
         Ok(trainer)

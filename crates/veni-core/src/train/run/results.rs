@@ -31,8 +31,11 @@ const CHUNK: usize = 64;
 impl Trainer {
     /// The network that is validated and stored: averaged weights, no gradients.
     pub(super) fn averaged(&self) -> Result<Network> {
-        let weights =
-            if self.config.ema_decay > 0.0 { self.optimiser.averages() } else { self.optimiser.weights() };
+        let weights = if self.config.ema_decay > 0.0 {
+            self.optimiser.averages()
+        } else {
+            self.optimiser.weights().clone()
+        };
         Ok(weights::write(self.network().clone(), "", &weights)?.valid())
     }
 

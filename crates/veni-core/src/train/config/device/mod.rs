@@ -93,9 +93,14 @@ impl DeviceKind {
     /// What computes the decoder best here: kernels on a processor, tensor operations on any other device, whose data
     /// would have to come to the processor and back.
     pub fn decoder_by(self) -> DecoderBy {
+        if self.is_processor() { DecoderBy::Kernels } else { DecoderBy::Tensors }
+    }
+
+    /// Whether it is the processor, through one of burn's backends for it.
+    pub fn is_processor(self) -> bool {
         match self {
-            Self::Flex | Self::Ndarray => DecoderBy::Kernels,
-            Self::Wgpu | Self::Cuda => DecoderBy::Tensors,
+            Self::Flex | Self::Ndarray => true,
+            Self::Wgpu | Self::Cuda => false,
         }
     }
 
