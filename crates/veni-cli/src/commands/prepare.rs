@@ -30,8 +30,8 @@ use store::{Settings, Store};
 #[command(
     long_about = "Turn any folder of equirectangular panoramas into a training folder: \
         train/, val/ (and test/) with half-float EXR files of one size, report.md, report.json and contact.png.\n\n\
-        Folders are searched to the bottom for OpenEXR and Radiance files and for PNG, JPEG, WebP and (feature avif) AVIF images of any size. Those \
-        hold no more than a display's range: their clipped regions are found and the sun and other highlights rebuilt \
+        Folders are searched to the bottom for OpenEXR and Radiance files and for PNG, JPEG, WebP and (feature avif) AVIF \
+        images of any size. Those hold no more than a display's range: their clipped regions are found and the sun and other highlights rebuilt \
         (--expand). Every file is checked; what is broken, not twice as wide as high, too small, black, transparent or one grey \
         is refused and listed with the reason. Sources are never changed.\n\n\
         Panoramas of one capture stay on one side of the split: by name (street_01_4k, street_02_ev-2 and \

@@ -73,7 +73,8 @@ impl LdrPanorama {
     }
 
     /// Reads a PNG, JPEG or WebP file of 8 or 16 bits, or an AVIF file (feature `avif`) of 8 to 12, grey or coloured, turned
-    /// upright where its EXIF data says so (AVIF that is to be turned is refused); the content decides the format, not the name. Alpha hides nothing (see [`LdrPanorama::transparent`]);
+    /// upright where its EXIF data says so (AVIF that is to be turned is refused); the content decides the format, not the
+    /// name. Alpha hides nothing (see [`LdrPanorama::transparent`]);
     /// colour profiles are not applied: values are taken for Rec. 709 primaries.
     ///
     /// # Errors

@@ -148,12 +148,13 @@ impl TrainConfig {
     /// On a processor as many devices, each with its share of `threads`, as divide every batch evenly: one where there
     /// is but one thread, and of auto-decoders, whose batches are not shared. A graphics device stays one.
     pub fn share_threads(&mut self, threads: usize) {
-        let processor = self.device.is_processor() && self.latents.is_none();
-        let stages = self.stages().unwrap_or_default();
+        // what is wrong with a stage `check` will say
+        let stages =
+            if self.device.is_processor() && self.latents.is_none() { self.stages() } else { Ok(Vec::new()) };
+        let stages = stages.unwrap_or_default();
         let batches = || stages.iter().map(|stage| stage.config.batch / stage.config.accumulate.max(1));
-        let fits = |count: &usize| batches().all(|batch| batch.is_multiple_of(*count));
-        let count = if processor { (1..=threads).rev().find(fits) } else { None };
-        self.devices = Devices::first(count.unwrap_or(1));
+        let fits = |count: &usize| !stages.is_empty() && batches().all(|batch| batch.is_multiple_of(*count));
+        self.devices = Devices::first((1..=threads).rev().find(fits).unwrap_or(1));
     }
 
     /// Parameter groups, by the first part of their parameters' paths: `decoder`, and `encoder` or `latents`.

@@ -10,7 +10,8 @@ impl TrainConfig {
     /// The configuration with dotted keys replaced: each override is `key.path=value`, the value in TOML
     /// (bare words are taken as strings). With `steps`, learning rates that fell until the old last step fall
     /// until the new one; another `device` brings its `decoder_by` along and is the first of its kind, unless `decoder_by`
-    /// and `devices` are named too ([`Self::set_device`]). `stage.NAME.key.path` changes a stage, and with its steps those of the run.
+    /// and `devices` are named too ([`Self::set_device`]). `stage.NAME.key.path` changes a stage, and with its steps those
+    /// of the run.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the override that has no `=`, no such key, or a value of the wrong type.

@@ -120,8 +120,9 @@ impl DeviceKind {
         self.open_number(None)
     }
 
-    /// The devices of these numbers, at least one. CUDA counts as `nvidia-smi -L` does, within `CUDA_VISIBLE_DEVICES`; wgpu counts graphics
-    /// cards, and 0 alone is whatever it prefers. A processor has as many as are asked for: shares of its threads.
+    /// The devices of these numbers, at least one. CUDA counts as `nvidia-smi -L` does, within `CUDA_VISIBLE_DEVICES`; wgpu
+    /// counts graphics cards, and 0 alone is whatever it prefers. A processor has as many as are asked for: shares of its
+    /// threads.
     ///
     /// # Errors
     /// As [`DeviceKind::open`], naming the number.
