@@ -14,6 +14,13 @@ fn configured(dir: &Dir, run: &str, key: &str) -> String {
     line.unwrap_or_else(|| panic!("{key} is not in {config}")).trim_matches('"').to_owned()
 }
 
+/// The loss of every update of a run.
+fn losses(dir: &Dir, run: &str) -> Vec<f64> {
+    let log = std::fs::read_to_string(dir.path(run).join("metrics.jsonl")).unwrap();
+    let lines = log.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    lines.filter_map(|line| line["loss"].as_f64()).collect()
+}
+
 #[test]
 fn a_device_that_is_missing_names_the_remedy() {
     let dir = Dir::new();
@@ -66,13 +73,7 @@ fn devices_share_a_batch_and_are_remembered() {
     dir.ok(&with("two", "0,1"));
     assert_eq!(configured(&dir, "two", "devices"), "0,1");
     dir.ok(&with("one", "0"));
-    let loss = |run: &str| {
-        let log = std::fs::read_to_string(dir.path(run).join("metrics.jsonl")).unwrap();
-        serde_json::from_str::<serde_json::Value>(log.lines().next().unwrap()).unwrap()["loss"]
-            .as_f64()
-            .unwrap()
-    };
-    let (two, one) = (loss("two"), loss("one"));
+    let (two, one) = (losses(&dir, "two")[0], losses(&dir, "one")[0]);
     assert!((two - one).abs() < 2e-5 * one, "{two} {one}");
     assert!(dir.ok(&["inspect", "two/model.safetensors", "--json"]).contains("--devices 0,1"));
 
@@ -148,7 +149,6 @@ fn without_a_graphics_device_auto_takes_the_processor_and_wgpu_is_refused() {
 #[test]
 fn a_run_on_a_graphics_device_is_the_run_on_the_processor() {
     use crate::gpu::{devices, skipped};
-    use serde_json::Value;
     if skipped("a_run_on_a_graphics_device_is_the_run_on_the_processor") {
         return;
     }
@@ -170,12 +170,7 @@ fn a_run_on_a_graphics_device_is_the_run_on_the_processor() {
 
     let run = dir.run(&loud("cpu", "flex"));
     assert!(run.code == Some(0) && !run.err.contains("training on"), "{run:?}");
-    let losses = |run: &str| -> Vec<f64> {
-        let log = std::fs::read_to_string(dir.path(run).join("metrics.jsonl")).unwrap();
-        let lines = log.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
-        lines.filter_map(|line| line["loss"].as_f64()).collect()
-    };
-    let (ours, theirs) = (losses("gpu"), losses("cpu"));
+    let (ours, theirs) = (losses(&dir, "gpu"), losses(&dir, "cpu"));
     assert!(ours.len() == 2 && theirs.len() == 2, "{ours:?} {theirs:?}");
     // after one step of Adam, whose size does not depend on a gradient's, weights with none to speak of differ
     for ((a, b), allowed) in ours.iter().zip(&theirs).zip([2e-5, 1e-2]) {
