@@ -22,6 +22,8 @@ mod folds;
 mod gpu;
 #[cfg(feature = "learn")]
 mod inspect;
+#[cfg(feature = "learn")]
+mod large_sets;
 #[cfg(feature = "onnx")]
 #[path = "../../crates/veni-core/src/panorama/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-core's tests use the rest of it")]

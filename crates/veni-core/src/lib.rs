@@ -9,7 +9,7 @@
 //! layers), `vae` (encoder and decoder), `data`, `train`, `fit`, `eval` and `baseline`. It uses the
 //! lighting world and never the reverse; the bridge between them is the model file.
 
-// what a renderer embeds has none; what trains has the calls in `field::bfloat16`
+// what a renderer embeds has none; what trains has the calls in `field::bfloat16` and `data::pixels`
 #![cfg_attr(not(feature = "learn"), forbid(unsafe_code))]
 
 pub mod error;

@@ -38,6 +38,8 @@ use watch::Watch;
         --pretrain makes a run of two stages; config.toml may describe others ([[stage]], see docs/MODEL.md): each has \
         updates, panoramas, learning rates, losses and augmentation of its own, and all are validated on the \
         panoramas of --data.\n\n\
+        More panoramas than --set data.memory_mib=4096 holds are kept in a file without a name beside RUN, or in the \
+        folder of --set data.scratch=DIR, and read from there.\n\n\
         Ctrl-C writes a checkpoint and ends; a second one ends at once. A run that was stopped or killed continues \
         with --resume from its last checkpoint as if nothing had happened, to the bit on the same machine.",
     after_help = "Examples:\n  \
@@ -207,6 +209,7 @@ impl Train {
         let started = Instant::now();
         let mut trainer = if self.resume { self.continued(report)? } else { self.begun(report)? };
         note_device(trainer.config(), report)?;
+        note_file(&trainer, report);
         if trainer.initialised() == Some(Initialised::Decoder) {
             let model = trainer.config().init.as_ref().map(|init| init.model.display().to_string());
             report.note(format_args!(
@@ -300,6 +303,18 @@ impl Train {
             "seconds": started.elapsed().as_secs_f64(),
         });
         report.result(human, &value)
+    }
+}
+
+/// How much of the data is not in memory, and how to change that.
+fn note_file(trainer: &Trainer, report: Report) {
+    let bytes = trainer.mapped_bytes();
+    if bytes > 0 {
+        report.note(format_args!(
+            "{:.1} GiB of resampled panoramas are in a file without a name, where data.scratch says; data.memory_mib is what \
+             a set may take in memory",
+            bytes as f64 / (1_u64 << 30) as f64
+        ));
     }
 }
 

@@ -1,4 +1,4 @@
-//! Panoramas in memory.
+//! Panoramas, ready for use.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::data::exposure::centre_exposure;
+use crate::data::pixels::Pixels;
 use crate::panorama::Panorama;
 use crate::parallel::parallel;
 use crate::sphere::Equirect;
@@ -21,7 +22,7 @@ pub struct Item {
     /// Where it was read from.
     pub path: PathBuf,
     /// Natural-log radiance at exposure 0, 3·W·H values.
-    pub log_radiance: Vec<f32>,
+    pub log_radiance: Pixels,
     /// What was subtracted: the solid-angle-weighted mean of ln(luminance).
     pub log_exposure: f32,
     /// Whether it is a generated scene ([`crate::synth`]).
@@ -33,7 +34,7 @@ impl Item {
     pub fn new(path: &Path, panorama: &Panorama, grid: Equirect) -> Self {
         let mut log_radiance = panorama.resample(grid).log().into_flattened();
         let log_exposure = centre_exposure(grid, &mut log_radiance);
-        Self { path: path.to_path_buf(), log_radiance, log_exposure, generated: false }
+        Self { path: path.to_path_buf(), log_radiance: log_radiance.into(), log_exposure, generated: false }
     }
 
     /// File name without extension.
@@ -83,7 +84,7 @@ impl Dataset {
     /// # Errors
     /// As [`Dataset::load`].
     pub fn load_heard(files: &[PathBuf], grid: Equirect, heard: Heard<'_>) -> Result<Self> {
-        Ok(Self::new(grid, load(files, grid, heard)?))
+        Ok(Self::new(grid, load(files, grid, |_, item| Ok(item), heard)?))
     }
 
     /// Only the panoramas that are wanted.
@@ -104,6 +105,12 @@ impl Dataset {
         &self.items
     }
 
+    /// Bytes of the pixels that are in a mapped file.
+    pub fn mapped_bytes(&self) -> u64 {
+        let mapped = self.items.iter().filter(|item| item.log_radiance.is_mapped());
+        mapped.map(|item| size_of_val(item.log_radiance.as_slice()) as u64).sum()
+    }
+
     /// Number of panoramas.
     pub fn len(&self) -> usize {
         self.items.len()
@@ -115,10 +122,16 @@ impl Dataset {
     }
 }
 
-pub(super) fn load(files: &[PathBuf], grid: Equirect, heard: Heard<'_>) -> Result<Vec<Item>> {
+/// Reads files, in parallel; each panorama goes through `keep` with its place in the list.
+pub(super) fn load(
+    files: &[PathBuf],
+    grid: Equirect,
+    keep: impl Fn(usize, Item) -> Result<Item> + Sync,
+    heard: Heard<'_>,
+) -> Result<Vec<Item>> {
     let done = AtomicUsize::new(0);
     parallel(files.len(), |at| {
-        let item = read_item(&files[at], grid)?;
+        let item = keep(at, read_item(&files[at], grid)?)?;
         heard(done.fetch_add(1, Ordering::Relaxed) + 1, files.len());
         Ok(item)
     })

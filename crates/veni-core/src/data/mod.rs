@@ -8,10 +8,13 @@ pub mod coarsen;
 mod dataset;
 pub mod exposure;
 mod fold;
+mod pixels;
 pub mod random;
 mod splits;
+mod store;
 
 pub use augment::AugmentConfig;
 pub use dataset::{Dataset, Heard, Item, panorama_files};
 pub use fold::Fold;
+pub use pixels::Pixels;
 pub use splits::{DataConfig, Splits};

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::dataset::{Dataset, Heard, Item, load, panorama_files};
 use super::fold::Fold;
+use super::store::PixelStore;
 use crate::data::random::{Purpose, permutation, stream};
 use crate::sphere::Equirect;
 use crate::synth::{Fixed, Scene, render};
@@ -34,6 +35,12 @@ pub struct DataConfig {
     /// Share of the draws that are generated scenes, in [0, 1]; absent: their share of the panoramas.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub synthetic_share: Option<f64>,
+    /// Most MiB that the resampled panoramas (12·W·H bytes each, train, val and generated together) take in memory. A larger
+    /// set is in a file that is mapped: slower only where the system lacks the memory to keep its pages.
+    pub memory_mib: u64,
+    /// Folder of that file, which has no name and goes with the process; absent: the one that holds the run's folder.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scratch: Option<PathBuf>,
 }
 
 impl Default for DataConfig {
@@ -46,6 +53,8 @@ impl Default for DataConfig {
             fold: None,
             synthetic: 0,
             synthetic_share: None,
+            memory_mib: 4096,
+            scratch: None,
         }
     }
 }
@@ -60,19 +69,21 @@ pub struct Splits {
 }
 
 impl Splits {
-    /// Reads what `config` names; `seed` decides the split where the folders do not, and the generated scenes.
+    /// Reads what `config` names; `seed` decides the split where the folders do not, and the generated scenes. Without
+    /// [`DataConfig::scratch`] the file of a large set is in the system's folder for temporary files.
     ///
     /// # Errors
-    /// [`Error::Invalid`] without folders or without any training panorama; otherwise as [`Dataset::load`].
+    /// [`Error::Invalid`] without folders, without any training panorama, or if there is not the space for a large set;
+    /// otherwise as [`Dataset::load`].
     pub fn open(config: &DataConfig, seed: u64) -> Result<Self> {
-        Self::open_heard(config, seed, &|_, _| {})
+        Self::open_heard(config, seed, &std::env::temp_dir(), &|_, _| {})
     }
 
-    /// [`Splits::open`], telling how far it has come.
+    /// [`Splits::open`] with another folder where [`DataConfig::scratch`] is absent, telling how far it has come.
     ///
     /// # Errors
     /// As [`Splits::open`].
-    pub fn open_heard(config: &DataConfig, seed: u64, heard: Heard<'_>) -> Result<Self> {
+    pub fn open_heard(config: &DataConfig, seed: u64, scratch: &Path, heard: Heard<'_>) -> Result<Self> {
         if config.folders.is_empty() && config.synthetic == 0 {
             return Err(Error::invalid("no data: name at least one folder of EXR or HDR panoramas"));
         }
@@ -129,23 +140,40 @@ impl Splits {
                 )));
             }
         }
-        let (files, all) = (train.len() + val.len(), train.len() + val.len() + config.synthetic);
-        let mut items = load(&train, grid, &|done, _| heard(done, all))?;
-        let val = Dataset::load_heard(&val, grid, &|done, _| heard(train.len() + done, all))?;
-        items.extend(generated(config.synthetic, seed, grid, &|done, _| heard(files + done, all)));
-        Ok(Self { train: Dataset::new(grid, items), val })
+        let scratch = config.scratch.as_deref().unwrap_or(scratch);
+        let (learned, files) = (train.len(), [train, val].concat());
+        let all = files.len() + config.synthetic;
+        let store = PixelStore::new(all, grid, config.memory_mib, scratch)?;
+        let mut items = load(&files, grid, |at, item| store.keep(at, item), &|done, _| heard(done, all))?;
+        items.extend(generated(
+            config.synthetic,
+            seed,
+            grid,
+            |at, item| store.keep(files.len() + at, item),
+            &|done, _| heard(files.len() + done, all),
+        )?);
+        store.seal(&mut items)?;
+        let val = items.drain(learned..files.len()).collect();
+        Ok(Self { train: Dataset::new(grid, items), val: Dataset::new(grid, val) })
     }
 }
 
-/// Scenes 0..`count` of the set with this seed, in order.
-fn generated(count: usize, seed: u64, grid: Equirect, heard: Heard<'_>) -> Vec<Item> {
+/// Scenes 0..`count` of the set with this seed, in order; each goes through `keep` with its number.
+fn generated(
+    count: usize,
+    seed: u64,
+    grid: Equirect,
+    keep: impl Fn(usize, Item) -> Result<Item> + Sync,
+    heard: Heard<'_>,
+) -> Result<Vec<Item>> {
     let done = AtomicUsize::new(0);
     let make = |index: usize| {
         let panorama = render(&Scene::draw(seed, index as u64, &Fixed::default()), grid);
         let path = format!("synth-{index:06}");
         let item = Item { generated: true, ..Item::new(Path::new(&path), &panorama, grid) };
+        let item = keep(index, item)?;
         heard(done.fetch_add(1, Ordering::Relaxed) + 1, count);
-        item
+        Ok(item)
     };
     (0..count).into_par_iter().map(make).collect()
 }
@@ -267,6 +295,24 @@ mod tests {
         assert!(message.contains("the other 0.5"), "{message}");
         let nothing = Splits::open(&DataConfig { folders: Vec::new(), ..with }, 4).unwrap();
         assert!(nothing.val.is_empty() && nothing.train == alone.train);
+    }
+
+    #[test]
+    fn a_set_beyond_its_memory_is_mapped_and_the_same() {
+        let folder = folder(&["train/a.exr", "train/b.exr", "val/c.exr"]);
+        let small = DataConfig { synthetic: 2, ..config(folder.path()) };
+        let memory = Splits::open(&small, 3).unwrap();
+        let scratch = tempfile::tempdir().unwrap();
+        let large = DataConfig { memory_mib: 0, scratch: Some(scratch.path().to_path_buf()), ..small };
+        let file = Splits::open(&large, 3).unwrap();
+        assert_eq!(file, memory);
+        assert_ne!(file.train.items()[0], file.train.items()[1]);
+        for (splits, mapped) in [(memory, false), (file, true)] {
+            let mut all = splits.train.items().iter().chain(splits.val.items());
+            assert!(all.all(|item| item.log_radiance.is_mapped() == mapped));
+            let bytes = if mapped { 12 * 8 * 4 } else { 0 };
+            assert_eq!([splits.train.mapped_bytes(), splits.val.mapped_bytes()], [4 * bytes, bytes]);
+        }
     }
 
     #[test]

@@ -124,9 +124,10 @@ impl<'a> Batches<'a> {
     pub fn augmented(&self, index: usize, step: u64, slot: u64) -> Vec<f32> {
         let items = self.train.items();
         let mut rng = stream(self.seed, Purpose::Augment, step, slot);
-        let image = &items[index].log_radiance;
-        self.augment
-            .apply(self.train.grid(), image, &mut rng, |rng| &items[self.draws.partner(rng)].log_radiance)
+        let image = items[index].log_radiance.fetched();
+        self.augment.apply(self.train.grid(), image, &mut rng, |rng| {
+            items[self.draws.partner(rng)].log_radiance.fetched()
+        })
     }
 }
 

@@ -1,5 +1,7 @@
 //! Which panoramas a batch takes.
 
+use std::sync::{Mutex, PoisonError};
+
 use rand::Rng;
 
 use crate::data::Dataset;
@@ -18,8 +20,43 @@ pub(super) struct Draws {
     batch: usize,
     share: f64,
     /// All panoramas, or the photographed ones where there is a share.
-    photographed: Vec<usize>,
-    generated: Vec<usize>,
+    photographed: Pool,
+    generated: Pool,
+}
+
+/// Panoramas that are drawn from together.
+#[derive(Debug)]
+struct Pool {
+    panoramas: Vec<usize>,
+    /// Part of the key of its orders.
+    key: u64,
+    /// The epoch drawn from last, and its order: a batch asks for one panorama at a time, and to shuffle a million of them
+    /// for each takes longer than a step.
+    order: Mutex<Option<(u64, Vec<usize>)>>,
+}
+
+impl Pool {
+    fn new(panoramas: Vec<usize>, key: u64) -> Self {
+        Self { panoramas, key, order: Mutex::default() }
+    }
+
+    /// The panorama of draw `rank` (from 0), when each comes once per epoch.
+    fn shuffled(&self, seed: u64, rank: u64) -> usize {
+        let n = self.panoramas.len() as u64;
+        let (epoch, place) = (rank / n, (rank % n) as usize);
+        let mut kept = self.order.lock().unwrap_or_else(PoisonError::into_inner);
+        let order = match kept.take() {
+            Some((of, order)) if of == epoch => order,
+            _ => permutation(&mut stream(seed, Purpose::Order, epoch, self.key), n as usize),
+        };
+        let index = order[place];
+        *kept = Some((epoch, order));
+        self.panoramas[index]
+    }
+
+    fn any(&self, rng: &mut impl Rng) -> usize {
+        self.panoramas[below(rng, self.panoramas.len())]
+    }
 }
 
 impl Draws {
@@ -35,8 +72,8 @@ impl Draws {
             seed: config.seed,
             batch: config.batch,
             share: share.unwrap_or(0.0),
-            photographed: pick(&|generated| share.is_none() || !generated),
-            generated: pick(&|generated| share.is_some() && generated),
+            photographed: Pool::new(pick(&|generated| share.is_none() || !generated), u64::MAX),
+            generated: Pool::new(pick(&|generated| share.is_some() && generated), u64::MAX - 1),
         }
     }
 
@@ -44,27 +81,21 @@ impl Draws {
     pub(super) fn choice(&self, step: u64, slot: usize) -> usize {
         let drawn = (step - 1) * self.batch as u64 + slot as u64;
         let before = |draws: u64| (draws as f64 * self.share).floor() as u64;
-        let (pool, rank, key) = if before(drawn + 1) > before(drawn) {
-            (&self.generated, before(drawn), u64::MAX - 1)
+        let (pool, rank) = if before(drawn + 1) > before(drawn) {
+            (&self.generated, before(drawn))
         } else {
-            (&self.photographed, drawn - before(drawn), u64::MAX)
+            (&self.photographed, drawn - before(drawn))
         };
-        let n = pool.len();
         match self.order {
-            Order::Replacement => pool[below(&mut stream(self.seed, Purpose::Order, step, slot as u64), n)],
-            Order::Shuffle => {
-                let epoch = rank / n as u64;
-                let order = permutation(&mut stream(self.seed, Purpose::Order, epoch, key), n);
-                pool[order[(rank % n as u64) as usize]]
-            }
+            Order::Replacement => pool.any(&mut stream(self.seed, Purpose::Order, step, slot as u64)),
+            Order::Shuffle => pool.shuffled(self.seed, rank),
         }
     }
 
     /// A second panorama for an augmentation that combines two: of either kind with the probability that a draw has.
     pub(super) fn partner(&self, rng: &mut impl Rng) -> usize {
         let generated = self.share > 0.0 && uniform(rng) < self.share;
-        let pool = if generated { &self.generated } else { &self.photographed };
-        pool[below(rng, pool.len())]
+        if generated { &self.generated } else { &self.photographed }.any(rng)
     }
 }
 
@@ -80,7 +111,7 @@ mod tests {
         let grid = Equirect::new(2, 1);
         let item = |index: usize| Item {
             path: index.to_string().into(),
-            log_radiance: vec![0.0; 6],
+            log_radiance: vec![0.0; 6].into(),
             log_exposure: 0.0,
             generated: index >= 5,
         };
@@ -103,6 +134,19 @@ mod tests {
             assert_eq!(epoch, (0..12).collect::<Vec<_>>());
         }
         assert_ne!(drawn[..12], drawn[12..]);
+    }
+
+    #[test]
+    fn draws_do_not_depend_on_what_was_drawn_before() {
+        for (order, share) in
+            [(Order::Shuffle, None), (Order::Shuffle, Some(0.3)), (Order::Replacement, None)]
+        {
+            let forwards = all(&draws(order, share), 12);
+            let again = draws(order, share);
+            let backwards: Vec<_> =
+                (1..=12).rev().flat_map(|step| [3, 2, 1, 0].map(|slot| again.choice(step, slot))).collect();
+            assert!(forwards.iter().eq(backwards.iter().rev()), "{order:?}");
+        }
     }
 
     #[test]

@@ -72,7 +72,7 @@ impl<'a> RayBatches<'a> {
             noise: Vec::with_capacity(3 * self.batch * self.latent_vectors),
         };
         for (slot, panorama) in (0..).zip(&batch.panoramas) {
-            let image = &self.train.items()[*panorama].log_radiance;
+            let image = self.train.items()[*panorama].log_radiance.fetched();
             let mut rng = stream(self.seed, Purpose::Sampling, step, slot);
             for _ in 0..self.rays {
                 let height = uniform(&mut rng);

@@ -79,6 +79,13 @@ impl Trainer {
         &self.config
     }
 
+    /// Bytes of panoramas that are in files, not in memory ([`DataConfig::memory_mib`](crate::data::DataConfig::memory_mib)).
+    pub fn mapped_bytes(&self) -> u64 {
+        let own = [&self.splits.train, &self.splits.val];
+        let stages = self.stages.iter().filter_map(|running| running.data.as_ref());
+        own.into_iter().chain(stages).map(Dataset::mapped_bytes).sum()
+    }
+
     /// Updates made so far.
     pub fn steps_done(&self) -> u64 {
         self.optimiser.updates()

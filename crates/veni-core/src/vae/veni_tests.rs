@@ -44,7 +44,7 @@ impl Setup {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/panoramas/val");
         let grid = Equirect::new(128, 64);
         let set = Dataset::load(&panorama_files(&folder).unwrap()[..2], grid).unwrap();
-        let images = set.items().iter().map(|item| item.log_radiance.clone()).collect();
+        let images = set.items().iter().map(|item| item.log_radiance.to_vec()).collect();
         Self { veni, grid, images }
     }
 

@@ -186,7 +186,9 @@ impl Train {
         words.extend(numbers.into_iter().filter_map(|(name, n)| Some(format!("{name} {}", n?))));
         words.extend(self.devices.iter().map(|devices| format!("--devices {devices}")));
         words.extend(self.mixed_precision.then(|| "--mixed-precision".to_owned()));
-        words.extend(self.set.iter().map(|set| format!("--set {}", shell_word(Path::new(set)))));
+        // where panoramas were kept meanwhile changes nothing, and is a path of this machine
+        let set = self.set.iter().filter(|set| !set.trim_start().starts_with("data.scratch"));
+        words.extend(set.map(|set| format!("--set {}", shell_word(Path::new(set)))));
         words.push(format!("--out {}", last(&self.out)));
         words.join(" ")
     }

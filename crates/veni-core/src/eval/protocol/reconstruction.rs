@@ -96,8 +96,8 @@ fn side_by_side(run: &Evaluation<'_>, columns: &[Column]) -> Sheet {
     let names: Vec<_> = items.iter().map(Item::name).collect();
     let mut sheet = Sheet::new(grid, &titles, &names);
     for (row, item) in items.iter().enumerate() {
-        let images =
-            std::iter::once(&item.log_radiance).chain(columns.iter().map(|(_, images)| &images[row]));
+        let images = std::iter::once(item.log_radiance.as_slice())
+            .chain(columns.iter().map(|(_, images)| images[row].as_slice()));
         for (column, image) in images.enumerate() {
             sheet.place(column, row, &display(grid, image));
         }

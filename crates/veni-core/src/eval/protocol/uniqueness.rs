@@ -161,7 +161,7 @@ fn measure(
         let distance = log_error(first.vectors.as_flattened(), second.vectors.as_flattened()).sqrt();
         let decoded = subject.decode(grid, &[first, second, midpoint])?;
         let (a, b, middle) = (&decoded[0], &decoded[1], &decoded[2]);
-        let target = &item.log_radiance;
+        let target = item.log_radiance.as_slice();
         measured.push(Measured {
             midpoint: [log_error(a, middle), weighted_log_error(a, middle, grid.height)],
             fits: [log_error(a, target), log_error(b, target)],

@@ -22,7 +22,7 @@ fn a_whole_panorama_is_what_training_sees() {
         grid,
     );
     assert!((seen.log_exposure - item.log_exposure).abs() < 1e-5);
-    let pairs = seen.log_radiance.iter().zip(&item.log_radiance);
+    let pairs = seen.log_radiance.iter().zip(item.log_radiance.iter());
     assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-5));
     assert!(seen.mask.is_none() && seen.clipped.is_none() && !seen.is_partial());
     assert!((seen.share() - 1.0).abs() < 1e-5);

@@ -109,10 +109,11 @@ impl Trainer {
         let opened = config.device.open_all(&config.devices)?;
         let devices: Vec<_> = opened.into_iter().map(|opened| opened.device.autodiff()).collect();
         config.decoder_by.check()?;
-        let splits = Splits::open_heard(&config.data, config.seed, heard)?;
+        let scratch = existing_above(folder);
+        let splits = Splits::open_heard(&config.data, config.seed, scratch, heard)?;
         let running = |stage: Stage| -> Result<Running> {
             let needed = stage.own_data && stage.end() > done;
-            let data = needed.then(|| own_data(&stage, &splits.val, heard)).transpose()?;
+            let data = needed.then(|| own_data(&stage, &splits.val, scratch, heard)).transpose()?;
             Ok(Running { stage, data })
         };
         let stages = config.stages()?.into_iter().map(running).collect::<Result<_>>()?;
@@ -138,6 +139,13 @@ impl Trainer {
     }
 }
 
+/// The nearest folder above that exists.
+fn existing_above(folder: &Path) -> &Path {
+    let above = folder.ancestors().skip(1).find(|above| above.is_dir());
+    // of a relative path the last is empty
+    above.unwrap_or(Path::new("."))
+}
+
 fn refuse_used(folder: &Path) -> Result<()> {
     if is_free(folder)? {
         return Ok(());
@@ -150,10 +158,11 @@ fn refuse_used(folder: &Path) -> Result<()> {
 const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
 
 /// The training panoramas of a stage, without those that validate the run.
-fn own_data(stage: &Stage, val: &Dataset, heard: Heard<'_>) -> Result<Dataset> {
+fn own_data(stage: &Stage, val: &Dataset, scratch: &Path, heard: Heard<'_>) -> Result<Dataset> {
     let name = stage.name.as_deref().unwrap_or_default();
     let named = |e: Error| Error::invalid(format!("stage {name}: {e}"));
-    let train = Splits::open_heard(&stage.config.data, stage.config.seed, heard).map_err(named)?.train;
+    let train =
+        Splits::open_heard(&stage.config.data, stage.config.seed, scratch, heard).map_err(named)?.train;
     let file = |path: &Path| fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     let held_out: HashSet<_> = val.items().iter().map(|item| file(&item.path)).collect();
     let kept = train.retain(|item| !held_out.contains(&file(&item.path)));

@@ -1,6 +1,7 @@
 //! What a run says of itself: validation, previews, the model file.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use super::*;
 use crate::data::DataConfig;
@@ -49,15 +50,13 @@ impl Trainer {
             Some(latents) => subset(&self.splits.val, latents.validation_panoramas),
             None => self.splits.val.clone(),
         };
-        let mean = |set: &Dataset, decoded: Vec<Vec<f32>>| {
-            let scores = |decoded| Reconstruction::compare(set, decoded, Alignment::LogFactor).mean;
-            (!set.is_empty()).then(|| scores(&decoded))
+        let mean = |set: &Dataset, known: bool| -> Result<_> {
+            let decode = |range| self.reconstructed(&network, set, range, known);
+            let scores = Reconstruction::by_parts(set, Alignment::LogFactor, decode)?.mean;
+            Ok((!set.is_empty()).then_some(scores))
         };
         let train = subset(&self.splits.train, self.config.report.train_subset);
-        let (val, train) = (
-            mean(&val, self.reconstructed(&network, &val, false)?),
-            mean(&train, self.reconstructed(&network, &train, true)?),
-        );
+        let (val, train) = (mean(&val, false)?, mean(&train, true)?);
         let step = self.steps_done();
         // without validation panoramas the last weights are the best known
         let best = match (val, self.best) {
@@ -74,16 +73,23 @@ impl Trainer {
         Ok(())
     }
 
-    /// Log radiance decoded from the latents of panoramas: those that the encoder gives them, or, of an auto-decoder,
-    /// the first rows of its table (`known`) or fitted ones.
-    fn reconstructed(&self, network: &Network, set: &Dataset, known: bool) -> Result<Vec<Vec<f32>>> {
-        let (grid, images) = (set.grid(), views(set.items()));
+    /// Log radiance decoded from the latents of panoramas `range` of a set: those that the encoder gives them, or, of an
+    /// auto-decoder, their rows in its table (`known`) or fitted ones.
+    fn reconstructed(
+        &self,
+        network: &Network,
+        set: &Dataset,
+        range: Range<usize>,
+        known: bool,
+    ) -> Result<Vec<Vec<f32>>> {
+        let (grid, images) = (set.grid(), views(&set.items()[range.clone()]));
         let latents = match (network, &self.config.latents) {
             (Network::Veni(veni), _) => {
                 veni.encode(grid, &images)?.into_iter().map(|e| Latent::new(e.vectors)).collect()
             }
             (Network::Reni(reni), _) if known => {
-                table_rows(&reni.latents).into_iter().take(set.len()).map(|row| row.latent).collect()
+                let rows = table_rows(&reni.latents).into_iter();
+                rows.skip(range.start).take(range.len()).map(|row| row.latent).collect()
             }
             (Network::Reni(reni), Some(config)) => fitted(&reni.decoder, grid, &images, config)?,
             (Network::Reni(_), None) => unreachable!("checked with the configuration"),
@@ -191,12 +197,12 @@ impl Trainer {
         for copy in 0..=copies {
             for chosen in chosen.chunks(CHUNK) {
                 let image = |i: usize| match copy {
-                    0 => Cow::Borrowed(&train.items()[i].log_radiance),
+                    0 => Cow::Borrowed(train.items()[i].log_radiance.fetched()),
                     // slots beyond any batch: copies that no update has seen
                     _ => Cow::Owned(batches.augmented(i, u64::MAX, (copy * train.len() + i) as u64)),
                 };
                 let images: Vec<_> = chosen.iter().map(|i| image(*i)).collect();
-                let views: Vec<_> = images.iter().map(|image| image.as_slice()).collect();
+                let views: Vec<_> = images.iter().map(Cow::as_ref).collect();
                 for (encoded, i) in veni.encode(train.grid(), &views)?.into_iter().zip(chosen) {
                     let log_exposure = train.items()[*i].log_exposure;
                     codes.push(Latent { log_exposure, ..Latent::new(encoded.vectors) });
@@ -219,10 +225,10 @@ impl Trainer {
         let set = Dataset::new(self.splits.train.grid(), items);
         let mut rng = stream(self.config.seed, Purpose::Preview, 0, 0);
         let samples: Vec<_> = set.items().iter().map(|_| Latent::sample(&prior, &mut rng).vectors).collect();
-        let decoded = self.reconstructed(&network, &set, known)?;
+        let decoded = self.reconstructed(&network, &set, 0..set.len(), known)?;
         let samples = decode(network.decoder(), set.grid(), &samples);
         let rows: Vec<_> = (set.items().iter().zip(decoded.into_iter().zip(samples)))
-            .map(|(item, (reconstruction, sample))| vec![item.log_radiance.clone(), reconstruction, sample])
+            .map(|(item, (reconstruction, sample))| vec![item.log_radiance.to_vec(), reconstruction, sample])
             .collect();
         let path = self.folder.join("preview").join(format!("step-{step:06}.png"));
         preview::write(&path, set.grid(), &rows)?;
@@ -248,7 +254,7 @@ impl Trainer {
 }
 
 fn views(items: &[crate::data::Item]) -> Vec<&[f32]> {
-    items.iter().map(|item| item.log_radiance.as_slice()).collect()
+    items.iter().map(|item| item.log_radiance.fetched()).collect()
 }
 
 /// Latents optimised for panoramas that the table does not know, from zero.

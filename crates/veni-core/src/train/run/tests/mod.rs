@@ -3,6 +3,7 @@
 use std::fs;
 
 mod gradients;
+mod large;
 mod learning;
 mod resuming;
 mod stages;
