@@ -161,6 +161,8 @@ fn results_are_json_when_asked_for() {
     assert_eq!((value["width"].as_u64(), value["height"].as_u64()), (Some(32), Some(16)));
     assert_eq!((value["precision"].as_str(), value["layout"].as_str()), (Some("half"), Some("equirect")));
     assert_eq!(value["latent"]["n"], 4);
+    let args = ["bake", "--model", model(), "--seed", "1", "--size", "32", "-o", "b.png", "-o", "b.hdr"];
+    assert!(dir.json(&args)[0]["precision"].is_null(), "only EXR has a choice");
 }
 
 #[test]

@@ -74,12 +74,13 @@ impl Picture {
     }
 
     /// For the result line: "1024 x 512 half".
-    pub(crate) fn describe(&self, precision: &str) -> String {
+    pub(crate) fn describe(&self, precision: Option<&str>) -> String {
+        let precision = precision.map(|precision| format!(", {precision}")).unwrap_or_default();
         let Equirect { width, height } = self.grid;
         match self.layout {
-            Layout::Equirect => format!("{width} x {height}, {precision}"),
+            Layout::Equirect => format!("{width} x {height}{precision}"),
             Layout::Cubemap => {
-                format!("six faces of {width} x {width}, {} frame, {precision}", self.frame_name())
+                format!("six faces of {width} x {width}, {} frame{precision}", self.frame_name())
             }
         }
     }

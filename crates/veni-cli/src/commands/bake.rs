@@ -257,7 +257,9 @@ impl Bake {
         report: Report,
     ) -> Result<()> {
         let seconds = started.elapsed().as_secs_f64();
-        let precision = if precision == Precision::Half { "half" } else { "float" };
+        // the other formats have but one
+        let exr = files.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")));
+        let precision = exr.then_some(if precision == Precision::Half { "half" } else { "float" });
         let from = latent.source.as_deref().unwrap_or("unknown source");
         let files: Vec<_> = files.iter().map(|p| p.display().to_string()).collect();
         let human = format!(

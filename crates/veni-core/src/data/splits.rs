@@ -142,7 +142,7 @@ impl Splits {
         }
         let scratch = config.scratch.as_deref().unwrap_or(scratch);
         let (learned, files) = (train.len(), [train, val].concat());
-        let all = files.len() + config.synthetic;
+        let all = files.len().saturating_add(config.synthetic);
         let store = PixelStore::new(all, grid, config.memory_mib, scratch)?;
         let mut items = load(&files, grid, |at, item| store.keep(at, item), &|done, _| heard(done, all))?;
         items.extend(generated(

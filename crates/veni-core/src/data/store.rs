@@ -35,7 +35,7 @@ impl PixelStore {
     /// [`Error::Invalid`] if there is not the space for it, [`Error::Io`] if there can be no file.
     pub(super) fn new(panoramas: usize, grid: Equirect, memory_mib: u64, folder: &Path) -> Result<Self> {
         let values = 3 * grid.len();
-        let bytes = 4 * values as u64 * panoramas as u64;
+        let bytes = (4 * values as u64).saturating_mul(panoramas as u64);
         if bytes <= memory_mib.saturating_mul(MIB) {
             return Ok(Self { values, scratch: None });
         }
@@ -144,6 +144,8 @@ mod tests {
         for word in ["32 × 16 pixels", "data.scratch", "data.memory_mib = 4096", "GiB"] {
             assert!(message.contains(word), "{message}");
         }
+        let message = PixelStore::new(usize::MAX, GRID, 4096, folder.path()).unwrap_err().to_string();
+        assert!(message.contains("space are left"), "{message}");
         let missing = folder.path().join("missing");
         let message = PixelStore::new(1, GRID, 0, &missing).unwrap_err().to_string();
         assert!(message.contains("missing") && message.contains("data.scratch"), "{message}");
