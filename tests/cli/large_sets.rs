@@ -36,8 +36,8 @@ fn a_set_beyond_its_memory_trains_the_same_model_and_leaves_no_file() {
 #[test]
 fn a_set_that_no_disk_holds_is_refused_at_once() {
     let dir = Dir::new();
-    let mut many = vec!["train", "--synthetic", "1000000000", "--preset", "small", "--out", "run"];
-    dir.refused(&many, &["space", "1000000000 panoramas", "data.scratch", "data.memory_mib"]);
+    let mut many = vec!["train", "--synthetic", "1000000000000", "--preset", "small", "--out", "run"];
+    dir.refused(&many, &["space", "1000000000000 panoramas", "data.scratch", "data.memory_mib"]);
     many.extend(["--set", "data.scratch=\"/nowhere\""]);
     dir.refused(&many, &["/nowhere", "data.scratch"]);
 }
