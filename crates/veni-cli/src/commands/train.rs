@@ -308,12 +308,15 @@ impl Train {
 
 /// How much of the data is not in memory, and how to change that.
 fn note_file(trainer: &Trainer, report: Report) {
-    let bytes = trainer.mapped_bytes();
-    if bytes > 0 {
+    let mib = trainer.mapped_bytes().div_ceil(1 << 20);
+    if mib > 0 {
+        let data = &trainer.config().data;
+        let folder =
+            data.scratch.as_ref().map_or("beside the run".to_owned(), |s| format!("in {}", s.display()));
         report.note(format_args!(
-            "{:.1} GiB of resampled panoramas are in a file without a name, where data.scratch says; data.memory_mib is what \
-             a set may take in memory",
-            bytes as f64 / (1_u64 << 30) as f64
+            "{mib} MiB of resampled panoramas are in a file without a name {folder}: a set may take data.memory_mib = {} in \
+             memory, and data.scratch names the folder",
+            data.memory_mib
         ));
     }
 }
