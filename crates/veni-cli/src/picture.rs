@@ -73,7 +73,7 @@ impl Picture {
         Ok(attributes)
     }
 
-    /// For the result line: "1024 x 512 half".
+    /// For the result line: "1024 x 512, half".
     pub(crate) fn describe(&self, precision: Option<&str>) -> String {
         let precision = precision.map(|precision| format!(", {precision}")).unwrap_or_default();
         let Equirect { width, height } = self.grid;

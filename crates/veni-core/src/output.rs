@@ -54,6 +54,12 @@ pub fn refuse_existing(path: &Path, overwrite: Overwrite) -> Result<()> {
     Ok(())
 }
 
+/// The nearest folder above `path` that exists; of a relative path, at last the working folder.
+pub fn existing_above(path: &Path) -> &Path {
+    // the last ancestor of a relative path is empty
+    path.ancestors().skip(1).find(|above| above.exists()).unwrap_or(Path::new("."))
+}
+
 /// Whether this is the unfinished file of a [`write_atomic`], by its name.
 pub fn is_part(path: &Path) -> bool {
     let hidden = path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));

@@ -30,8 +30,8 @@ struct Pool {
     panoramas: Vec<usize>,
     /// Part of the key of its orders.
     key: u64,
-    /// The epoch drawn from last, and its order: a batch asks for one panorama at a time, and to shuffle a million of them
-    /// for each takes longer than a step.
+    /// The epoch drawn from last, and its order: a batch asks for one panorama at a time, and to shuffle takes time and
+    /// memory in proportion to all of them.
     order: Mutex<Option<(u64, Vec<usize>)>>,
 }
 

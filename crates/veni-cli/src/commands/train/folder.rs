@@ -4,10 +4,11 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use veni_core::Error;
+use veni_core::output::existing_above;
 use veni_core::train::run::{is_free, leftovers};
 
 use super::Train;
-use crate::output::{folder_of, writable};
+use crate::output::writable;
 
 /// What a run writes into its folder.
 const FILES: [&str; 4] = ["config.toml", "metrics.jsonl", "model.safetensors", "latents.safetensors"];
@@ -64,15 +65,6 @@ impl Train {
         }
         Ok(())
     }
-}
-
-/// The nearest folder above that exists.
-fn existing_above(path: &Path) -> &Path {
-    let mut folder = folder_of(path);
-    while !folder.exists() && folder != Path::new(".") {
-        folder = folder_of(folder);
-    }
-    folder
 }
 
 fn remove(path: &Path, how: impl Fn(&Path) -> std::io::Result<()>) -> Result<()> {

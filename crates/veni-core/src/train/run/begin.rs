@@ -7,7 +7,7 @@ use std::io::Write;
 use super::*;
 use crate::data::Heard;
 use crate::model::Model;
-use crate::output::{Overwrite, write_atomic};
+use crate::output::{Overwrite, existing_above, write_atomic};
 use crate::train::init::{self, InitConfig};
 
 impl Trainer {
@@ -137,13 +137,6 @@ impl Trainer {
         }
         Ok(())
     }
-}
-
-/// The nearest folder above that exists.
-fn existing_above(folder: &Path) -> &Path {
-    let above = folder.ancestors().skip(1).find(|above| above.is_dir());
-    // of a relative path the last is empty
-    above.unwrap_or(Path::new("."))
 }
 
 fn refuse_used(folder: &Path) -> Result<()> {

@@ -39,7 +39,8 @@ fn a_run_on_mapped_panoramas_is_the_run_in_memory_to_the_bit() {
 fn panoramas_of_a_stage_have_a_file_of_their_own() {
     let (folder, config) = setup(4);
     let stages = format!(
-        "\n[[stage]]\nname = \"a\"\nsteps = 2\ndata.folders = [{:?}]\ndata.memory_mib = 0\n\n[[stage]]\nname = \"b\"\nsteps = 2\n",
+        "\n[[stage]]\nname = \"a\"\nsteps = 2\ndata.folders = [{:?}]\ndata.memory_mib = 0\n\
+         \n[[stage]]\nname = \"b\"\nsteps = 2\n",
         folder.path().join("data/train")
     );
     let config = TrainConfig::from_toml(&(config.to_toml().unwrap() + &stages)).unwrap();
