@@ -34,6 +34,32 @@ fn a_set_beyond_its_memory_trains_the_same_model_and_leaves_no_file() {
 }
 
 #[test]
+fn a_run_goes_on_where_its_panoramas_find_room() {
+    let dir = Dir::new();
+    let data = text(panoramas());
+    for folder in ["one", "other"] {
+        std::fs::create_dir(dir.path(folder)).unwrap();
+    }
+    dir.ok(&args(&data, "run", &["data.memory_mib=0", "data.scratch=one"]));
+    std::fs::remove_dir(dir.path("one")).unwrap();
+    let settings = std::fs::read(dir.path("run/config.toml")).unwrap();
+    let resume = ["train", "--resume", "--out", "run"];
+    let run = dir.run(&[&resume[..], &["--set", "data.scratch=other"]].concat());
+    assert_eq!(run.code, Some(0), "{}", run.err);
+    assert!(run.err.contains("in other"), "{}", run.err);
+    // said with everything that it was begun with, too
+    let whole = args(&data, "run", &["data.memory_mib=1000", "data.scratch=other"]);
+    let run = dir.run(&[&whole[..], &["--resume"]].concat());
+    assert_eq!(run.code, Some(0), "{}", run.err);
+    assert_eq!(std::fs::read(dir.path("run/config.toml")).unwrap(), settings);
+    // anything else is another run
+    for other in ["data.width=32", "loss.kld=0.5", "data.scratch"] {
+        let run = dir.run(&[&resume[..], &["--set", other]].concat());
+        assert_eq!(run.code, Some(2), "{other}: {}", run.err);
+    }
+}
+
+#[test]
 fn a_set_that_no_disk_holds_is_refused_at_once() {
     let dir = Dir::new();
     let mut many = vec!["train", "--synthetic", "1000000000000", "--preset", "small", "--out", "run"];

@@ -2,6 +2,7 @@
 
 mod config;
 mod folder;
+mod resume;
 mod watch;
 
 use std::path::{Path, PathBuf};
@@ -39,7 +40,7 @@ use watch::Watch;
         updates, panoramas, learning rates, losses and augmentation of its own, and all are validated on the \
         panoramas of --data.\n\n\
         More panoramas than --set data.memory_mib=4096 holds are kept in a file without a name beside RUN, or in the \
-        folder of --set data.scratch=DIR, and read from there.\n\n\
+        folder of --set data.scratch=DIR, and read from there; both may be given anew with --resume.\n\n\
         Ctrl-C writes a checkpoint and ends; a second one ends at once. A run that was stopped or killed continues \
         with --resume from its last checkpoint as if nothing had happened, to the bit on the same machine.",
     after_help = "Examples:\n  \
@@ -135,7 +136,8 @@ pub(crate) struct Train {
     #[arg(long)]
     mixed_precision: bool,
 
-    /// Continue the run in RUN; other settings, if given, must be its own
+    /// Continue the run in RUN; other settings, if given, must be its own, but for --set data.scratch and
+    /// data.memory_mib, which change no result
     #[arg(long, conflicts_with = "force")]
     resume: bool,
 
@@ -266,9 +268,11 @@ impl Train {
             );
         }
         self.check_same(&stored)?;
+        let holding = self.holding(&stored)?;
         let loading = Loading::new(report);
-        let trainer =
-            Trainer::resume_heard(&self.out, &self.command_line(), &|done, all| loading.set(done, all));
+        let trainer = Trainer::resume_heard(&self.out, &self.command_line(), &holding, &|done, all| {
+            loading.set(done, all);
+        });
         loading.finish();
         Ok(trainer?)
     }

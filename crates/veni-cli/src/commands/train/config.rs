@@ -9,6 +9,7 @@ use veni_core::train::config::{DecoderBy, TrainConfig};
 use veni_core::train::init::InitConfig;
 use veni_core::train::presets::Preset;
 
+use super::resume::held_by;
 use super::{PresetName, SystemName, Train, shell_word};
 use crate::source;
 
@@ -79,68 +80,15 @@ impl Train {
     }
 
     /// Whether it is said which devices of their kind compute, if by a file that does not mention them.
-    fn names_devices(&self) -> bool {
+    pub(super) fn names_devices(&self) -> bool {
         let set = self.set.iter().filter_map(|set| set.split_once('='));
         self.devices.is_some()
             || self.config.is_some()
             || set.into_iter().any(|(key, _)| key.trim() == "devices")
     }
 
-    fn pretrains(&self) -> bool {
+    pub(super) fn pretrains(&self) -> bool {
         !self.pretrain.is_empty() || self.pretrain_synthetic.is_some()
-    }
-
-    /// With `--resume`: whatever else was typed must be what the run was begun with.
-    pub(super) fn check_same(&self, stored: &Path) -> Result<()> {
-        let described = !self.data.is_empty() || self.config.is_some();
-        let begun = self.init.is_some() || self.pretrains() || self.pretrain_steps.is_some();
-        let changed = begun
-            || self.system.is_some()
-            || self.preset.is_some()
-            || self.latent_vectors.is_some()
-            || self.seed.is_some()
-            || self.steps.is_some()
-            || self.synthetic.is_some()
-            || self.fold.is_some()
-            || self.device.is_some()
-            || self.devices.is_some()
-            || self.mixed_precision
-            || !self.set.is_empty();
-        if !described && !changed {
-            return Ok(());
-        }
-        if !described {
-            bail!(
-                "{}: a run goes on with its own settings: leave the other options out, or give --data and all that \
-                 it was begun with",
-                self.out.display()
-            );
-        }
-        let (old, mut new) = (read(stored)?, self.settings()?);
-        if let (Some(old), Some(new)) = (&old.init, &mut new.init) {
-            // known only once the model was read
-            new.digest = new.digest.take().or_else(|| old.digest.clone());
-        }
-        if !self.names_devices() {
-            // another machine may have other threads to share
-            new.devices.clone_from(&old.devices);
-        }
-        let (old, new) = (old.to_toml()?, new.to_toml()?);
-        let differing = old.lines().zip(new.lines()).find(|(a, b)| a != b);
-        match differing {
-            Some((old, new)) => bail!(
-                "{}: the run was begun with '{old}', not '{new}'; leave the options out to go on with its own \
-                 settings, or name another --out",
-                self.out.display()
-            ),
-            None if old.lines().count() != new.lines().count() => {
-                bail!(
-                    "{}: the run was begun with other settings; leave the options out to go on",
-                    self.out.display()
-                )
-            }
-            None => Ok(()),
-        }
     }
 
     /// The command that repeats this run, for the model file. A model is given away: of a path only its last name
@@ -187,14 +135,14 @@ impl Train {
         words.extend(self.devices.iter().map(|devices| format!("--devices {devices}")));
         words.extend(self.mixed_precision.then(|| "--mixed-precision".to_owned()));
         // where panoramas were kept meanwhile changes nothing, and is a path of this machine
-        let set = self.set.iter().filter(|set| !set.trim_start().starts_with("data.scratch"));
+        let set = self.set.iter().filter(|set| held_by(set) != Some("scratch"));
         words.extend(set.map(|set| format!("--set {}", shell_word(Path::new(set)))));
         words.push(format!("--out {}", last(&self.out)));
         words.join(" ")
     }
 }
 
-fn read(path: &Path) -> Result<TrainConfig> {
+pub(super) fn read(path: &Path) -> Result<TrainConfig> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
     TrainConfig::from_toml(&text).map_err(|e| anyhow!("{}", e.in_file(path)))
 }

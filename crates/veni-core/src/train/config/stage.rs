@@ -25,6 +25,7 @@ use toml::{Table, Value};
 
 use super::TrainConfig;
 use super::overrides::float_where_float;
+use crate::data::Holding;
 use crate::model::ModelKind;
 use crate::{Error, Result};
 
@@ -85,6 +86,23 @@ impl TrainConfig {
             stages.push(Stage { name: Some(stage.name.clone()), first: before, own_data, config });
         }
         Ok(stages)
+    }
+
+    /// The same run with its panoramas, those of all stages too, held as `holding` says.
+    #[must_use]
+    pub fn held(mut self, holding: &Holding) -> Self {
+        let Holding { memory_mib, scratch } = holding;
+        let given = [memory_mib.is_some(), scratch.is_some()];
+        for stage in &mut self.stage {
+            if let Some(Value::Table(data)) = stage.changes.get_mut("data") {
+                for (key, _) in Holding::KEYS.iter().zip(given).filter(|(_, given)| *given) {
+                    data.remove(*key);
+                }
+            }
+        }
+        self.data.memory_mib = memory_mib.unwrap_or(self.data.memory_mib);
+        self.data.scratch = scratch.clone().or(self.data.scratch);
+        self
     }
 
     fn with_stage(&self, index: u64, stage: &StageConfig) -> Result<Self> {

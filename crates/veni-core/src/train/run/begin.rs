@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write;
 
 use super::*;
-use crate::data::Heard;
+use crate::data::{Heard, Holding};
 use crate::model::Model;
 use crate::output::{Overwrite, existing_above, write_atomic};
 use crate::train::init::{self, InitConfig};
@@ -63,17 +63,18 @@ impl Trainer {
     /// # Errors
     /// [`Error::Io`] or [`Error::Invalid`] if `config.toml` or the checkpoint cannot be read or do not fit together.
     pub fn resume(folder: &Path, command: &str) -> Result<Self> {
-        Self::resume_heard(folder, command, &|_, _| {})
+        Self::resume_heard(folder, command, &Holding::default(), &|_, _| {})
     }
 
-    /// [`Trainer::resume`], telling how far reading the data has come.
+    /// [`Trainer::resume`], with panoramas held as `holding` says (`config.toml` keeps what it says of that), telling how far
+    /// reading the data has come.
     ///
     /// # Errors
     /// As [`Trainer::resume`].
-    pub fn resume_heard(folder: &Path, command: &str, heard: Heard<'_>) -> Result<Self> {
+    pub fn resume_heard(folder: &Path, command: &str, holding: &Holding, heard: Heard<'_>) -> Result<Self> {
         let path = folder.join("config.toml");
         let text = fs::read_to_string(&path).map_err(|e| Error::io(&path, "read", e))?;
-        let config = TrainConfig::from_toml(&text).map_err(|e| e.in_file(&path))?;
+        let config = TrainConfig::from_toml(&text).map_err(|e| e.in_file(&path))?.held(holding);
         for left in leftovers(folder)? {
             fs::remove_file(&left).map_err(|e| Error::io(&left, "remove", e))?;
         }

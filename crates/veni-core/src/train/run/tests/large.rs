@@ -1,6 +1,7 @@
 //! Runs on panoramas that are in a file.
 
 use super::*;
+use crate::data::Holding;
 
 /// The run with all panoramas in files.
 fn beyond_memory(config: &TrainConfig) -> TrainConfig {
@@ -48,6 +49,44 @@ fn panoramas_of_a_stage_have_a_file_of_their_own() {
     assert_eq!(trainer.mapped_bytes(), 2 * 12 * (config.data.width * config.data.height) as u64);
     complete(&mut trainer);
     assert_eq!(trainer.mapped_bytes(), 0, "it goes with the stage");
+}
+
+/// The disk that a run was begun on is gone, and the memory of the next machine is small.
+#[test]
+fn a_resumed_run_holds_its_panoramas_elsewhere_and_ends_with_the_same_weights() {
+    let (folder, mut config) = setup(4);
+    config.report.checkpoint_every = 2;
+    let [whole, moved, scratch] = ["whole", "moved", "scratch"].map(|name| folder.path().join(name));
+    fs::create_dir(&scratch).unwrap();
+    let gone = folder.path().join("gone");
+    let stages = format!(
+        "\n[[stage]]\nname = \"a\"\nsteps = 3\ndata.memory_mib = 0\ndata.scratch = {gone:?}\n\
+         \n[[stage]]\nname = \"b\"\nsteps = 1\n"
+    );
+    let (width, height) = (config.data.width, config.data.height);
+    let config = TrainConfig::from_toml(&(config.to_toml().unwrap() + &stages)).unwrap();
+    fs::create_dir(&gone).unwrap();
+    complete(&mut Trainer::create(&whole, config.clone(), "test").unwrap());
+    let stop = AtomicBool::new(false);
+    let mut trainer = Trainer::create(&moved, config, "test").unwrap();
+    trainer.run(&stop, &mut After { step: 2, stop: &stop, panic: false }).unwrap();
+    drop(trainer);
+    let settings = file(&moved, "config.toml");
+    fs::remove_dir(&gone).unwrap();
+    assert!(Trainer::resume(&moved, "test").unwrap_err().to_string().contains("gone"));
+    let panorama = 12 * (width * height) as u64;
+    for (memory_mib, mapped) in [(Some(100), 0), (None, 2 * panorama), (Some(0), (3 + 2) * panorama)] {
+        let holding = Holding { memory_mib, scratch: Some(scratch.clone()) };
+        let mut trainer = Trainer::resume_heard(&moved, "test", &holding, &|_, _| {}).unwrap();
+        assert_eq!(trainer.mapped_bytes(), mapped, "{memory_mib:?}");
+        if memory_mib == Some(0) {
+            complete(&mut trainer);
+        }
+    }
+    assert!(file(&moved, "config.toml") == settings);
+    for name in ["checkpoint/state.safetensors", "model.safetensors"] {
+        assert!(file(&whole, name) == file(&moved, name), "{name}");
+    }
 }
 
 #[test]

@@ -1,0 +1,84 @@
+//! What may be said to a run that goes on.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use veni_core::data::Holding;
+
+use super::Train;
+use super::config::read;
+
+impl Train {
+    /// With `--resume`: whatever else was typed must be what the run was begun with, but for where its panoramas are held.
+    pub(super) fn check_same(&self, stored: &Path) -> Result<()> {
+        let described = !self.data.is_empty() || self.config.is_some();
+        let begun = self.init.is_some() || self.pretrains() || self.pretrain_steps.is_some();
+        let changed = begun
+            || self.system.is_some()
+            || self.preset.is_some()
+            || self.latent_vectors.is_some()
+            || self.seed.is_some()
+            || self.steps.is_some()
+            || self.synthetic.is_some()
+            || self.fold.is_some()
+            || self.device.is_some()
+            || self.devices.is_some()
+            || self.mixed_precision
+            || self.set.iter().any(|set| held_by(set).is_none());
+        if !described && !changed {
+            return Ok(());
+        }
+        if !described {
+            bail!(
+                "{}: a run goes on with its own settings: leave the other options out, or give --data and all that \
+                 it was begun with",
+                self.out.display()
+            );
+        }
+        let (old, mut new) = (read(stored)?, self.settings()?);
+        if let (Some(old), Some(new)) = (&old.init, &mut new.init) {
+            // known only once the model was read
+            new.digest = new.digest.take().or_else(|| old.digest.clone());
+        }
+        if !self.names_devices() {
+            // another machine may have other threads to share
+            new.devices.clone_from(&old.devices);
+        }
+        let holding = Holding { memory_mib: Some(old.data.memory_mib), scratch: old.data.scratch.clone() };
+        new = new.held(&holding);
+        let (old, new) = (old.to_toml()?, new.to_toml()?);
+        let differing = old.lines().zip(new.lines()).find(|(a, b)| a != b);
+        match differing {
+            Some((old, new)) => bail!(
+                "{}: the run was begun with '{old}', not '{new}'; leave the options out to go on with its own \
+                 settings, or name another --out",
+                self.out.display()
+            ),
+            None if old.lines().count() != new.lines().count() => {
+                bail!(
+                    "{}: the run was begun with other settings; leave the options out to go on",
+                    self.out.display()
+                )
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Where `--set` says that the panoramas are held from now on.
+    pub(super) fn holding(&self, stored: &Path) -> Result<Holding> {
+        let set: Vec<_> = self.set.iter().filter(|set| held_by(set).is_some()).collect();
+        let data = read(stored)?.with_overrides(&set).context("--set")?.data;
+        let given = |key| set.iter().any(|set| held_by(set) == Some(key));
+        Ok(Holding {
+            memory_mib: given("memory_mib").then_some(data.memory_mib),
+            scratch: given("scratch").then_some(data.scratch).flatten(),
+        })
+    }
+}
+
+/// Which of the settings of holding a `--set` gives.
+pub(super) fn held_by(set: &str) -> Option<&'static str> {
+    let (key, _) = set.split_once('=')?;
+    let key = key.trim().strip_prefix("data.")?;
+    Holding::KEYS.into_iter().find(|held| *held == key)
+}
