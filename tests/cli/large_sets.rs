@@ -52,6 +52,11 @@ fn a_run_goes_on_where_its_panoramas_find_room() {
     let run = dir.run(&[&whole[..], &["--resume"]].concat());
     assert_eq!(run.code, Some(0), "{}", run.err);
     assert_eq!(std::fs::read(dir.path("run/config.toml")).unwrap(), settings);
+    // and one that was begun with neither
+    dir.ok(&args(&data, "plain", &[]));
+    let moved = args(&data, "plain", &["data.memory_mib=0", "data.scratch=other"]);
+    let run = dir.run(&[&moved[..], &["--resume"]].concat());
+    assert_eq!(run.code, Some(0), "{}", run.err);
     // anything else is another run
     for other in ["data.width=32", "loss.kld=0.5", "data.scratch"] {
         let run = dir.run(&[&resume[..], &["--set", other]].concat());

@@ -44,9 +44,8 @@ impl Train {
             // another machine may have other threads to share
             new.devices.clone_from(&old.devices);
         }
-        let holding = Holding { memory_mib: Some(old.data.memory_mib), scratch: old.data.scratch.clone() };
-        new = new.held(&holding);
-        let (old, new) = (old.to_toml()?, new.to_toml()?);
+        let holding = self.holding(stored)?;
+        let (old, new) = (old.held(&holding).to_toml()?, new.held(&holding).to_toml()?);
         let differing = old.lines().zip(new.lines()).find(|(a, b)| a != b);
         match differing {
             Some((old, new)) => bail!(
