@@ -82,7 +82,7 @@ pub(crate) struct Train {
     init: Option<PathBuf>,
 
     /// Train on other panoramas first (synthetic skies, expanded photographs), then on those of --data with a tenth of
-    /// the learning rates
+    /// the learning rates (--set stage.finetune.encoder.learning_rate.rate=1e-3, and likewise decoder, for others)
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "config")]
     pretrain: Vec<PathBuf>,
 
