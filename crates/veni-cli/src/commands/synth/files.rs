@@ -38,18 +38,13 @@ impl Files {
         resume: bool,
     ) -> Result<Self> {
         let this = Self { folder: folder.to_path_buf(), precision, overwrite, resume };
-        if folder.is_dir() {
-            writable(folder, folder)?;
-            if !resume {
-                let refused = indices.find_map(|index| refuse_existing(&this.path(index), overwrite).err());
-                if let Some(e) = refused {
-                    bail!("{e}, --resume keeps it and writes what is missing");
-                }
+        make(folder)?;
+        writable(folder, folder)?;
+        if !resume {
+            let refused = indices.find_map(|index| refuse_existing(&this.path(index), overwrite).err());
+            if let Some(e) = refused {
+                bail!("{e}, --resume keeps it and writes what is missing");
             }
-        } else if folder.exists() {
-            bail!("{}: is a file; name a folder", folder.display());
-        } else {
-            std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         }
         Ok(this)
     }
@@ -91,6 +86,17 @@ impl Files {
     }
 }
 
+/// Creates the folder unless it is there. In this order: another shard may make it between any two questions.
+fn make(folder: &Path) -> Result<()> {
+    if !folder.exists() {
+        std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+    }
+    if !folder.is_dir() {
+        bail!("{}: is a file; name a folder", folder.display());
+    }
+    Ok(())
+}
+
 fn json(scene: &Scene) -> veni_core::Result<String> {
     serde_json::to_string(scene).map_err(|e| Error::invalid(format!("scene {}: {e}", scene.index)))
 }
@@ -104,4 +110,28 @@ fn scale(panorama: &Panorama) -> f32 {
     let brightest = panorama.pixels().as_flattened().iter().copied().fold(0f32, f32::max);
     let wanted = (MIDDLE / panorama.mean_log_luminance().exp()).log2().round();
     wanted.min((HALF_MAX / brightest).log2().floor()).exp2()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Barrier;
+
+    use super::*;
+
+    /// All shards of a command begin at once, and one of them is the first to make the folder.
+    #[test]
+    fn shards_that_begin_at_once_share_a_new_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        for round in 0..500 {
+            let (folder, barrier) = (dir.path().join(round.to_string()), Barrier::new(4));
+            std::thread::scope(|scope| {
+                for _ in 0..4 {
+                    scope.spawn(|| {
+                        barrier.wait();
+                        make(&folder).unwrap();
+                    });
+                }
+            });
+        }
+    }
 }
