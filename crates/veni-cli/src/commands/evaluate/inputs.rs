@@ -9,12 +9,12 @@ use veni_core::baseline::Kind;
 use veni_core::data::{Fold, panorama_files};
 use veni_core::eval::codec::Basis;
 use veni_core::eval::subject::Subject;
-use veni_core::output::{Overwrite, write_atomic};
+use veni_core::output::{Overwrite, existing_above, write_atomic};
 use veni_core::train::config::DeviceKind;
 
 use super::BaselineName;
 use crate::args::ModelArgs;
-use crate::output::{folder_of, with_remedy, writable};
+use crate::output::{with_remedy, writable};
 use crate::source;
 
 /// Says that a folder is an evaluation's.
@@ -105,11 +105,7 @@ pub(super) fn panoramas(data: &[PathBuf], fold: Option<Fold>, most: Option<usize
 /// Refuses a folder that is in use for something else, before any work.
 pub(super) fn check_folder(out: &Path) -> Result<()> {
     if !out.exists() {
-        let mut above = folder_of(out);
-        while !above.exists() && above != Path::new(".") {
-            above = folder_of(above);
-        }
-        return writable(above, out);
+        return writable(existing_above(out), out);
     }
     if !out.is_dir() {
         bail!("{}: is a file; name a folder for the evaluation with --out", out.display());

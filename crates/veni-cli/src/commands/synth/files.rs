@@ -9,7 +9,7 @@ use veni_core::panorama::{HalfRange, Panorama, Precision, WriteFormat, WriteOpti
 use veni_core::sphere::Equirect;
 use veni_core::synth::Scene;
 
-use crate::output::writable;
+use crate::output::{create_folder, writable};
 
 /// Attribute of a generated panorama: its parameters as JSON.
 const SCENE: &str = "veni:scene";
@@ -88,9 +88,7 @@ impl Files {
 
 /// Creates the folder unless it is there. In this order: another shard may make it between any two questions.
 fn make(folder: &Path) -> Result<()> {
-    if !folder.exists() {
-        std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-    }
+    create_folder(folder)?;
     if !folder.is_dir() {
         bail!("{}: is a file; name a folder", folder.display());
     }
