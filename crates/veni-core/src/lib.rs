@@ -1,45 +1,27 @@
-//! VENI, a learned prior of natural outdoor illumination (arXiv 2601.14079), in two worlds.
+//! VENI on burn: the equivariant layers ([`nn`]), encoder and decoder ([`vae`]), losses and training ([`train`]), latent
+//! optimisation under any decoder and objective ([`fit`]).
 //!
-//! The **lighting world** is what a renderer embeds; it knows nothing of tensors or training:
-//! `sphere` (directions, frames, grids), [`panorama`] (HDR images), [`latent`] (the code),
-//! [`model`] (the weight file), [`field`] (the decoder folded for one latent), [`shade`] (surfaces under that
-//! light), [`prepare`] (which panoramas are fit for training) and [`synth`] (generated outdoor scenes).
+//! One entrance to what stands below it, none of which knows burn:
 //!
-//! The **learning world** (feature `learn`, on by default) is built on burn: `nn` (equivariant
-//! layers), `vae` (encoder and decoder), `data`, `train`, `fit`, `eval` and `baseline`. It uses the
-//! lighting world and never the reverse; the bridge between them is the model file.
+//! | here | crate | what |
+//! |---|---|---|
+//! | [`sphere`], [`latent`], [`model`], [`field`] | veni-light | what a renderer embeds |
+//! | [`panorama`] | veni-image | panoramas in and out, colour, tone mapping, metrics |
+//! | [`synth`] | veni-synth | generated scenes |
+//! | [`fit`], [`shade`] | veni-fit | encoder in plain f32, latent optimisation, shaded surfaces |
+//! | [`data`], [`prepare`], [`expand`] | veni-data | panoramas for training |
+//!
+//! The bridge between training and use is the model file.
 
-// what a renderer embeds has none; what trains has the calls in `field::bfloat16` and `data::pixels`
-#![cfg_attr(not(feature = "learn"), forbid(unsafe_code))]
+#![forbid(unsafe_code)]
 
-pub mod error;
-pub mod field;
-pub mod latent;
-pub mod model;
-pub mod output;
-pub mod panorama;
-pub mod prepare;
-pub mod shade;
-pub mod sphere;
-pub mod synth;
-
-#[cfg(feature = "learn")]
-pub mod baseline;
-#[cfg(feature = "learn")]
-mod cholesky;
-#[cfg(feature = "learn")]
-pub mod data;
-#[cfg(feature = "learn")]
-pub mod eval;
-#[cfg(feature = "learn")]
 pub mod fit;
-#[cfg(feature = "learn")]
 pub mod nn;
-#[cfg(feature = "learn")]
-mod parallel;
-#[cfg(feature = "learn")]
 pub mod train;
-#[cfg(feature = "learn")]
 pub mod vae;
 
-pub use error::{Error, Result};
+pub use veni_data::{self as data, expand, prepare};
+pub use veni_fit::shade;
+pub use veni_image as panorama;
+pub use veni_light::{Error, Result, error, field, latent, model, output, random, sphere};
+pub use veni_synth as synth;

@@ -6,9 +6,9 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::time::Duration;
-use veni_core::latent::{Latent, Prior};
-use veni_core::model::{Model, ModelConfig};
-use veni_core::sphere::Equirect;
+use veni_light::latent::{Latent, Prior};
+use veni_light::model::{Model, ModelConfig};
+use veni_light::sphere::Equirect;
 use veni_gpu::adapters::{self, Opened};
 use veni_gpu::wgpu::{
     CommandEncoderDescriptor, Extent3d, PollType, TextureDescriptor, TextureDimension, TextureFormat,

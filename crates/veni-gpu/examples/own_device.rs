@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use veni_core::field::Field;
-use veni_core::latent::Latent;
-use veni_core::model::Model;
-use veni_core::sphere::Frame;
+use veni_light::field::Field;
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_light::sphere::Frame;
 use veni_gpu::wgpu::{self, BufferUsages, TextureUsages};
 use veni_gpu::{Bake, GpuDecoder, read_back};
 

@@ -13,7 +13,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use veni_core::model::Model;
+use veni_light::model::Model;
 use veni_gpu::shader::{self, Directions, ENTRY_POINT, Kernel, Sizes, Store, Variant, Weights};
 
 /// Workgroup memory that every WebGPU device has, bytes.

@@ -65,7 +65,7 @@ impl Found {
     }
 
     /// Whether it computes on the CPU (lavapipe, SwiftShader, WARP): never faster than
-    /// [`Field::bake`](veni_core::field::Field::bake).
+    /// [`Field::bake`](veni_light::field::Field::bake).
     pub fn is_software(&self) -> bool {
         self.info.device_type == DeviceType::Cpu
     }

@@ -20,7 +20,7 @@ pub enum Error {
     },
     /// From veni-core: a latent that does not fit the model, for instance.
     #[error(transparent)]
-    Core(#[from] veni_core::Error),
+    Core(#[from] veni_light::Error),
 }
 
 /// A result with this crate's [`Error`].

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use veni_core::latent::{Latent, Prior};
-use veni_core::model::{Model, ModelConfig};
-use veni_core::sphere::Equirect;
+use veni_light::latent::{Latent, Prior};
+use veni_light::model::{Model, ModelConfig};
+use veni_light::sphere::Equirect;
 use wgpu::{BufferDescriptor, BufferUsages, ComputePipelineDescriptor, Device, PollType, Queue};
 
 use crate::decoder::{Bake, GpuDecoder};

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::mpsc;
 
-use veni_core::sphere::Frame;
+use veni_light::sphere::Frame;
 use wgpu::{
     Buffer, BufferDescriptor, BufferUsages, Device, MapMode, Origin3d, PollType, Queue, TexelCopyBufferInfo,
     TexelCopyBufferLayout, TexelCopyTextureInfo, Texture, TextureAspect, TextureFormat,
@@ -27,7 +27,7 @@ pub struct Picture {
 }
 
 /// Bakes the first latent and hands the rows over one by one, from the top, as
-/// [`Field::bake_rows`](veni_core::field::Field::bake_rows) does. While one band is read, the next is computed; however
+/// [`Field::bake_rows`](veni_light::field::Field::bake_rows) does. While one band is read, the next is computed; however
 /// large the picture, two bands are held.
 ///
 /// # Errors

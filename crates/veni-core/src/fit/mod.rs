@@ -1,114 +1,143 @@
-//! Latent optimisation: the code of an image under a fixed decoder, by Levenberg–Marquardt or Adam on the latent.
-//!
-//! Every image has its own latent Z [N, 3] and log exposure s: the decoded log radiance plus s is compared with
-//! the image. s stays as it is unless it is asked to be free. An image may be a panorama, a part of one
-//! ([`FitTarget::masks`]), or a view in any directions, clipped values included.
+//! Latent optimisation with everything that burn adds to veni-fit: decoders as graphs of tensors, and the training losses
+//! as objectives over whole images.
 
-mod adam;
-mod config;
-mod descent;
-mod levenberg_marquardt;
-mod network;
-mod observation;
-mod pixel;
-mod shaded;
-mod stall;
-mod starts;
-mod target;
+mod graph;
+mod whole_loss;
 #[cfg(test)]
 mod tests;
-mod whole;
 
-pub use config::{FitConfig, Method, Objective, Plateau};
-pub use network::FitDecoder;
-pub use observation::{Observation, Picture};
-pub use shaded::{fit_shaded, matching_exposure};
-pub use starts::{Best, best_light, best_of, random_starts};
-pub use target::FitTarget;
+pub use veni_fit::*;
 
-use crate::latent::{Latent, Prior};
-use crate::{Error, Result};
-use descent::optimise;
-use network::{ImageLoss, Network};
-use pixel::PixelLoss;
-use whole::WholeLoss;
+use burn::tensor::Device;
+use veni_light::field;
+use veni_light::latent::{Latent, Prior};
 
-/// What came out.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FitResult {
-    /// One for each image, after the last update.
-    pub latents: Vec<Latent>,
-    /// The loss before each update, prior included, averaged over the images.
-    pub losses: Vec<f64>,
-    /// The loss of each image after the last update, without the prior.
-    pub last: Vec<f64>,
+use crate::{Result, vae};
+use whole_loss::WholeLoss;
+
+/// A decoder under which latents are optimised; its weights are constants.
+#[derive(Clone, Copy, Debug)]
+pub enum FitDecoder<'a> {
+    /// The decoder folded per latent, with its gradient in closed form: the fast way.
+    Folded(&'a field::Decoder),
+    /// The decoder as a graph of tensors on its device: every kind of decoder, every floating-point type.
+    Graph(&'a vae::Decoder),
 }
 
-/// Optimises one latent per image from `start`.
+impl<'a> From<&'a field::Decoder> for FitDecoder<'a> {
+    fn from(decoder: &'a field::Decoder) -> Self {
+        Self::Folded(decoder)
+    }
+}
+
+impl<'a> From<&'a vae::Decoder> for FitDecoder<'a> {
+    fn from(decoder: &'a vae::Decoder) -> Self {
+        Self::Graph(decoder)
+    }
+}
+
+impl<'a> FitDecoder<'a> {
+    /// As veni-fit takes it.
+    pub fn as_dyn(self) -> &'a dyn LatentDecoder {
+        match self {
+            Self::Folded(decoder) => decoder,
+            Self::Graph(decoder) => decoder,
+        }
+    }
+
+    /// N, the number of latent vectors.
+    pub fn latent_vectors(self) -> usize {
+        self.as_dyn().latent_vectors()
+    }
+
+    /// Where losses over whole images are computed.
+    fn device(self) -> Device {
+        match self {
+            Self::Folded(_) => Device::flex().autodiff(),
+            Self::Graph(decoder) => graph::autodiff_device(decoder),
+        }
+    }
+}
+
+/// Optimises one latent per image from `start`, under any objective.
 ///
 /// # Errors
-/// [`Error::Invalid`] if the numbers of images, masks and starts or their sizes disagree, if there are none,
-/// if the objective cannot take masks or clipped values that are given, or if the loss is no longer finite.
+/// As [`veni_fit::fit`]; and if the objective cannot take masks, clipped values or views that are given.
 pub fn fit<'a>(
     decoder: impl Into<FitDecoder<'a>>,
     target: &FitTarget<'_>,
     start: &[Latent],
     config: &FitConfig,
 ) -> Result<FitResult> {
-    fit_watched(decoder, target, start, config, &mut |_, _| {})
+    fit_observed(decoder, target, start, config, &mut |_, _| {})
 }
 
-/// [`fit`], telling `watch` the number of updates made and the loss, before each update.
+/// [`fit`] with an observer, who is told the number of updates made and the loss, before each update.
 ///
 /// # Errors
 /// As [`fit`].
-pub fn fit_watched<'a>(
+pub fn fit_observed<'a>(
     decoder: impl Into<FitDecoder<'a>>,
     target: &FitTarget<'_>,
     start: &[Latent],
     config: &FitConfig,
-    watch: &mut dyn FnMut(u64, f64),
+    observer: &mut dyn FnMut(u64, f64),
 ) -> Result<FitResult> {
     let decoder = decoder.into();
-    config.check()?;
     target.check()?;
-    let n = decoder.latent_vectors();
-    check_starts(start, target.images.len(), n)?;
-    check_prior(target.prior, n)?;
-    let loss = image_loss(decoder, target, config)?;
-    let network = Network::new(decoder, target.directions());
-    optimise(&network, &loss, target.prior, start, config, watch)
+    let whole = WholeLoss::new(config, target, &decoder.device())?;
+    let whole = whole.as_ref().map(|loss| loss as &dyn PanoramaLoss);
+    veni_fit::fit_with(decoder.as_dyn(), target, start, config, whole, observer)
 }
 
-fn check_starts(start: &[Latent], images: usize, n: usize) -> Result<()> {
-    if start.len() != images {
-        return Err(Error::invalid(format!("{images} images and {} latents to start from", start.len())));
-    }
-    if let Some(wrong) = start.iter().find(|z| z.vectors.len() != n) {
-        return Err(Error::invalid(format!(
-            "a start has {} vectors, the decoder takes {n}",
-            wrong.vectors.len()
-        )));
-    }
-    start.iter().try_for_each(Latent::check_finite)
-}
-
-fn check_prior(prior: Option<&Prior>, n: usize) -> Result<()> {
-    match prior.map(Prior::latent_vectors) {
-        Some(m) if m != n => Err(Error::invalid(format!("a prior of {m} vectors, the decoder takes {n}"))),
-        _ => Ok(()),
-    }
-}
-
-fn image_loss<'a>(
-    decoder: FitDecoder<'_>,
-    target: &FitTarget<'a>,
+/// [`veni_fit::best_of`] under any objective.
+///
+/// # Errors
+/// As [`fit`].
+///
+/// # Panics
+/// If there is no start, or not exactly one image.
+pub fn best_of<'a>(
+    decoder: impl Into<FitDecoder<'a>>,
+    target: &FitTarget<'_>,
+    starts: &[Latent],
     config: &FitConfig,
-) -> Result<ImageLoss<'a>> {
-    if let Some(whole) = WholeLoss::new(config, target, &decoder.device())? {
-        return Ok(ImageLoss::Whole(whole));
-    }
-    let areas = target.areas();
-    let images = (0..target.images.len()).map(|b| PixelLoss::new(config.objective, target, b, &areas));
-    Ok(ImageLoss::Pixels(images.flatten().collect()))
+    observer: &mut dyn FnMut(u64, f64),
+) -> Result<Best> {
+    assert!(target.images.len() == 1, "one image");
+    let decoder = decoder.into();
+    from_each(starts, config, observer, |start, observer| fit_observed(decoder, target, start, config, observer))
+}
+
+/// [`veni_fit::best_light`] for either kind of decoder.
+///
+/// # Errors
+/// As [`fit_shaded`].
+///
+/// # Panics
+/// If there is no start.
+pub fn best_light<'a>(
+    decoder: impl Into<FitDecoder<'a>>,
+    image: &shade::ShadedImage,
+    prior: Option<&Prior>,
+    starts: &[Latent],
+    config: &FitConfig,
+    observer: &mut dyn FnMut(u64, f64),
+) -> Result<Best> {
+    veni_fit::best_light(decoder.into().as_dyn(), image, prior, starts, config, observer)
+}
+
+/// [`veni_fit::fit_shaded`] for either kind of decoder.
+///
+/// # Errors
+/// As [`veni_fit::fit_shaded`].
+pub fn fit_shaded<'a>(
+    decoder: impl Into<FitDecoder<'a>>,
+    images: &[shade::ShadedImage],
+    prior: Option<&Prior>,
+    start: &[Latent],
+    config: &FitConfig,
+    observer: &mut dyn FnMut(u64, f64),
+) -> Result<FitResult> {
+    veni_fit::fit_shaded(decoder.into().as_dyn(), images, prior, start, config, observer)
 }

@@ -2,7 +2,7 @@
 
 use super::norm::COORDINATE;
 use super::{VectorLinear, VectorLinearConfig};
-use crate::model::VectorLayer;
+use veni_light::model::VectorLayer;
 use burn::module::Module;
 use burn::tensor::activation::softmax;
 use burn::tensor::{Bool, Device, Tensor};

@@ -4,7 +4,7 @@ use super::so2_linear::So2Feature;
 use super::vn_linear::matmul_channels;
 use super::vn_relu::vn_relu;
 use super::{VectorLinear, VectorLinearConfig, VnRelu, VnReluConfig};
-use crate::model::{VectorLayer, VnReluForm};
+use veni_light::model::{VectorLayer, VnReluForm};
 use burn::module::Module;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};

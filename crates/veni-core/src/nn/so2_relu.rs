@@ -34,7 +34,7 @@ impl So2Relu {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::VnReluForm;
+    use veni_light::model::VnReluForm;
     use crate::nn::testing::{assert_gradients, features, max_difference, rng, rotate_xy};
 
     #[test]

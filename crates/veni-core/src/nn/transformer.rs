@@ -4,7 +4,7 @@ use super::{
     GateWeights, VectorAttention, VectorAttentionConfig, VectorFeedForward, VectorFeedForwardConfig,
     VnLayerNorm, VnLayerNormConfig,
 };
-use crate::model::{VectorLayer, VnReluForm};
+use veni_light::model::{VectorLayer, VnReluForm};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use rand::Rng;

@@ -1,7 +1,7 @@
 //! Either linear layer behind one name.
 
 use super::{So2Linear, So2LinearConfig, VnLinear, VnLinearConfig};
-use crate::model::VectorLayer;
+use veni_light::model::VectorLayer;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use rand::Rng;

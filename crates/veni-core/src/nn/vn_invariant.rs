@@ -2,7 +2,7 @@
 
 use super::norm::COORDINATE;
 use super::{VnLinear, VnLinearConfig, VnRelu, VnReluConfig};
-use crate::model::VnReluForm;
+use veni_light::model::VnReluForm;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use rand::Rng;

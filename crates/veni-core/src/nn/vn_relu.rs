@@ -3,7 +3,7 @@
 use super::init::uniform;
 use super::norm::{COORDINATE, squared_coordinate_norm};
 use super::vn_linear::matmul_channels;
-use crate::model::VnReluForm;
+use veni_light::model::VnReluForm;
 use burn::module::{Module, Param};
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};

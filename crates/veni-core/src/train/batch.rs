@@ -1,9 +1,9 @@
 //! What one step works on, prepared on the host while the previous step computes.
 
-use crate::data::coarsen::averaged;
-use crate::data::random::{Purpose, below, normal, stream, uniform};
-use crate::data::{AugmentConfig, Dataset};
-use crate::sphere::{Equirect, Stripes};
+use veni_data::coarsen::averaged;
+use veni_light::random::{Purpose, below, normal, stream, uniform};
+use veni_data::{AugmentConfig, Dataset};
+use veni_light::sphere::{Equirect, Stripes};
 use crate::train::config::{LossGrid, TrainConfig};
 use crate::train::draws::Draws;
 

@@ -11,7 +11,7 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use crate::output::{Overwrite, write_atomic};
+use veni_light::output::{Overwrite, write_atomic};
 use crate::vae::weights::{Weight, Weights};
 use crate::{Error, Result};
 

@@ -7,14 +7,14 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
-use crate::data::{Dataset, Item};
-use crate::panorama::Panorama;
-use crate::sphere::Equirect;
+use veni_data::{Dataset, Item};
+use veni_image::Panorama;
+use veni_light::sphere::Equirect;
 use crate::train::config::{DecoderBy, DeviceKind, TrainConfig};
 use crate::train::network::{Network, Prepared};
 use crate::train::presets::Preset;
 use crate::train::replicas::Replicas;
-use crate::train::schedule::WeightSchedule;
+use veni_fit::schedule::WeightSchedule;
 use crate::train::step;
 use crate::vae::weights::{self, Weights};
 

@@ -4,8 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 use rand::Rng;
 
-use crate::data::Dataset;
-use crate::data::random::{Purpose, below, permutation, stream, uniform};
+use veni_data::Dataset;
+use veni_light::random::{Purpose, below, permutation, stream, uniform};
 use crate::train::config::{Order, TrainConfig};
 
 /// Draws panoramas, by their index in the training set. What is drawn is a pure function of the configuration and the
@@ -102,8 +102,8 @@ impl Draws {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Item;
-    use crate::sphere::Equirect;
+    use veni_data::Item;
+    use veni_light::sphere::Equirect;
     use crate::train::presets::Preset;
 
     /// Five photographs and seven generated scenes.

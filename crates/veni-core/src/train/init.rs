@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use crate::model::{Model, ModelKind};
+use veni_light::model::{Model, ModelKind};
 use crate::train::config::TrainConfig;
 use crate::train::network::Network;
 use crate::vae::weights::{self, Weight, Weights};
@@ -149,8 +149,8 @@ fn options(part: &impl Serialize) -> Result<Table> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::ModelInfo;
-    use crate::output::Overwrite;
+    use veni_light::model::ModelInfo;
+    use veni_light::output::Overwrite;
     use crate::train::presets::Preset;
     use burn::tensor::Device;
 
@@ -226,13 +226,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run").join("model.safetensors");
         std::fs::create_dir(folder.path().join("run")).unwrap();
-        model().save(&path, crate::model::StoredType::F32, Overwrite::Refuse).unwrap();
+        model().save(&path, veni_light::model::StoredType::F32, Overwrite::Refuse).unwrap();
         let mut init = InitConfig { model: path.clone(), digest: None };
         init.open().unwrap();
         assert_eq!(init.describe(), format!("run/model.safetensors {}", model().digest()));
         init.open().unwrap();
         network_model(&Preset::Tiny.config(3))
-            .save(&path, crate::model::StoredType::F32, Overwrite::Replace)
+            .save(&path, veni_light::model::StoredType::F32, Overwrite::Replace)
             .unwrap();
         let message = init.open().unwrap_err().to_string();
         assert!(message.contains("model.safetensors") && message.contains("init.digest"), "{message}");

@@ -7,9 +7,9 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};
 
-use crate::data::Dataset;
+use veni_data::Dataset;
 use crate::fit::FitConfig;
-use crate::output::{Overwrite, write_atomic};
+use veni_light::output::{Overwrite, write_atomic};
 use crate::train::config::GroupConfig;
 use crate::vae::LatentTable;
 use crate::{Error, Result};
@@ -68,7 +68,7 @@ pub fn save(path: &Path, table: &LatentTable, train: &Dataset, model: &str) -> R
         let view = TensorView::new(Dtype::F32, tensor.shape.clone(), bytes).map_err(|e| broken(&e))?;
         views.push((name.as_str(), view));
     }
-    let names: Vec<_> = train.items().iter().map(crate::data::Item::name).collect();
+    let names: Vec<_> = train.items().iter().map(veni_data::Item::name).collect();
     // one entry: the order of several is left to chance, and runs are compared to the bit
     let about = serde_json::json!({ "panoramas": names, "model": model }).to_string();
     let header = HashMap::from([("veni-latents".to_owned(), about)]);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::output::{Overwrite, write_atomic};
+use veni_light::output::{Overwrite, write_atomic};
 use crate::{Error, Result};
 
 /// An append-only log of records that have a `step`.

@@ -3,9 +3,9 @@
 use burn::module::Module;
 use burn::tensor::{Device, Gradients, Tensor};
 
-use crate::data::Dataset;
-use crate::data::random::{Purpose, stream};
-use crate::model::ModelKind;
+use veni_data::Dataset;
+use veni_light::random::{Purpose, stream};
+use veni_light::model::ModelKind;
 use crate::train::batch::{Batch, Batches};
 use crate::train::config::{DecoderBy, TrainConfig};
 use crate::train::loss::{Loss, LossTerms};

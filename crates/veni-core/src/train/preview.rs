@@ -4,10 +4,10 @@ use std::path::Path;
 
 use image::{ImageFormat, RgbImage};
 
-use crate::output::{Overwrite, write_atomic};
-use crate::panorama::Panorama;
-use crate::panorama::tonemap::Tonemap;
-use crate::sphere::Equirect;
+use veni_light::output::{Overwrite, write_atomic};
+use veni_image::Panorama;
+use veni_image::tonemap::Tonemap;
+use veni_light::sphere::Equirect;
 use crate::{Error, Result};
 
 /// Pixels between the panoramas.

@@ -1,7 +1,7 @@
 //! What one step of an auto-decoder works on: rays of some panoramas.
 
-use crate::data::Dataset;
-use crate::data::random::{Purpose, below, normal, stream, uniform};
+use veni_data::Dataset;
+use veni_light::random::{Purpose, below, normal, stream, uniform};
 use crate::train::config::TrainConfig;
 use crate::train::draws::Draws;
 
@@ -91,8 +91,8 @@ impl<'a> RayBatches<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Item;
-    use crate::sphere::Equirect;
+    use veni_data::Item;
+    use veni_light::sphere::Equirect;
     use crate::train::presets::Preset;
 
     #[test]

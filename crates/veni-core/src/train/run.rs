@@ -20,7 +20,7 @@ use std::time::Instant;
 use burn::module::Module;
 use serde::Serialize;
 
-use crate::data::{Dataset, Splits};
+use veni_data::{Dataset, Splits};
 use crate::train::checkpoint::{self, Best, CheckpointInfo};
 use crate::train::config::{Stage, TrainConfig};
 use crate::train::init::Initialised;
@@ -79,7 +79,7 @@ impl Trainer {
         &self.config
     }
 
-    /// Bytes of panoramas that are in files, not in memory ([`DataConfig::memory_mib`](crate::data::DataConfig::memory_mib)).
+    /// Bytes of panoramas that are in files, not in memory ([`DataConfig::memory_mib`](veni_data::DataConfig::memory_mib)).
     pub fn mapped_bytes(&self) -> u64 {
         let own = [&self.splits.train, &self.splits.val];
         let stages = self.stages.iter().filter_map(|running| running.data.as_ref());

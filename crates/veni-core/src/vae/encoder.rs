@@ -1,7 +1,7 @@
 //! VN-ViT, the rotation-equivariant encoder: a panorama seen as vertical stripes, one token each.
 
 use super::Posterior;
-use crate::model::{EncoderConfig, Pooling, Reduction, VectorLayer};
+use veni_light::model::{EncoderConfig, Pooling, Reduction, VectorLayer};
 use crate::nn::{
     FoldedGates, VectorLinear, VectorLinearConfig, VectorTransformer, VectorTransformerConfig,
     coordinate_norm,

@@ -1,7 +1,7 @@
 //! Equivariance, options and gradients of the encoder.
 
 use super::*;
-use crate::model::VnReluForm;
+use veni_light::model::VnReluForm;
 use crate::nn::testing::{assert_gradients, features, rng};
 use burn::tensor::TensorData;
 

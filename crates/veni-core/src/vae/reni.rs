@@ -6,7 +6,7 @@ use rand::Rng;
 
 use super::decoder::Condition;
 use super::{Decoder, weights};
-use crate::model::{Model, ModelConfig, ModelInfo};
+use veni_light::model::{Model, ModelConfig, ModelInfo};
 use crate::nn::normal;
 use crate::{Error, Result};
 

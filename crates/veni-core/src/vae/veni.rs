@@ -8,8 +8,8 @@ use rand::Rng;
 
 use super::weights::{self, Weight, Weights};
 use super::{Decoder, Encoder};
-use crate::model::{self, Model, ModelConfig, ModelInfo};
-use crate::sphere::{Equirect, Stripes};
+use veni_light::model::{self, Model, ModelConfig, ModelInfo};
+use veni_light::sphere::{Equirect, Stripes};
 use crate::{Error, Result};
 
 /// Images that go through the network together outside of training; bounds the memory.

@@ -9,11 +9,11 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::Veni;
-use crate::data::augment::{mirror, turn_columns};
-use crate::data::{Dataset, panorama_files};
-use crate::latent::Latent;
-use crate::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
-use crate::sphere::Equirect;
+use veni_data::augment::{mirror, turn_columns};
+use veni_data::{Dataset, panorama_files};
+use veni_light::latent::Latent;
+use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
+use veni_light::sphere::Equirect;
 
 const STRIPES: usize = 32;
 

@@ -164,7 +164,7 @@ impl ModuleMapper for Writer<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::DecoderConfig;
+    use veni_light::model::DecoderConfig;
     use crate::vae::Decoder;
     use burn::tensor::Device;
     use rand::SeedableRng;

@@ -21,11 +21,11 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use veni_core::field::Field;
-use veni_core::latent::Latent;
-use veni_core::model::Model;
-use veni_core::panorama::{luminance, tonemap::srgb};
-use veni_core::sphere::Equirect;
+use veni_light::field::Field;
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_image::{luminance, tonemap::srgb};
+use veni_light::sphere::Equirect;
 use veni_gpu::adapters::{self, Opened};
 use veni_gpu::shader::{self, Weights};
 use veni_gpu::wgpu::{self, BufferUsages};

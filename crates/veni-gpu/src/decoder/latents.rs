@@ -1,6 +1,6 @@
 //! Latents on the device, conditioned.
 
-use veni_core::latent::Latent;
+use veni_light::latent::Latent;
 use wgpu::{Buffer, BufferDescriptor, BufferUsages, Queue};
 
 use super::GpuDecoder;

@@ -7,8 +7,8 @@ mod target;
 
 use std::fmt;
 
-use veni_core::field::Decoder;
-use veni_core::model::Model;
+use veni_light::field::Decoder;
+use veni_light::model::Model;
 use wgpu::{Buffer, BufferDescriptor, BufferUsages, Device};
 
 pub use latents::GpuLatents;

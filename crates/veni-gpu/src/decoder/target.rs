@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use veni_core::sphere::Frame;
+use veni_light::sphere::Frame;
 use wgpu::{Buffer, BufferUsages, Texture, TextureDimension, TextureFormat, TextureUsages};
 
 use crate::error::{Error, Result};

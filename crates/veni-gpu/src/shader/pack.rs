@@ -1,7 +1,7 @@
 //! Weights and latents in the order that `layout.wgsl` describes.
 
-use veni_core::field::Field;
-use veni_core::model::Model;
+use veni_light::field::Field;
+use veni_light::model::Model;
 
 use super::Sizes;
 
@@ -117,8 +117,8 @@ impl Rows {
 
 #[cfg(test)]
 mod tests {
-    use veni_core::latent::{Latent, Prior};
-    use veni_core::model::{DecoderConfig, ModelConfig};
+    use veni_light::latent::{Latent, Prior};
+    use veni_light::model::{DecoderConfig, ModelConfig};
 
     use super::*;
 

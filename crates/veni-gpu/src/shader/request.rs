@@ -1,19 +1,19 @@
 //! The uniform of a bake: `VeniRequest` in `request.wgsl`.
 
-use veni_core::sphere::Frame;
+use veni_light::sphere::Frame;
 
 /// How the directions of a bake are laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grid {
     /// Latitude and longitude: `width` × `height` pixel centres, row 0 on top, as
-    /// [`Equirect`](veni_core::sphere::Equirect). The frame changes nothing here: pixels stay where they are.
+    /// [`Equirect`](veni_light::sphere::Equirect). The frame changes nothing here: pixels stay where they are.
     Equirect {
         /// Columns.
         width: u32,
         /// Rows.
         height: u32,
     },
-    /// Six square faces, +X −X +Y −Y +Z −Z of the frame, as [`CubeFace`](veni_core::sphere::CubeFace).
+    /// Six square faces, +X −X +Y −Y +Z −Z of the frame, as [`CubeFace`](veni_light::sphere::CubeFace).
     Cube {
         /// Texels along an edge.
         size: u32,

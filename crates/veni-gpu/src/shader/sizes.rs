@@ -1,6 +1,6 @@
 //! What the shaders are specialised on.
 
-use veni_core::model::ModelConfig;
+use veni_light::model::ModelConfig;
 
 /// Sizes of a decoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

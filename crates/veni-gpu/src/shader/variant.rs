@@ -304,7 +304,7 @@ fn tiling(sizes: Sizes, memory: u32) -> Option<Tiling> {
 
 #[cfg(test)]
 mod tests {
-    use veni_core::sphere::Frame;
+    use veni_light::sphere::Frame;
 
     use super::*;
     use crate::shader::Grid;

@@ -1,7 +1,7 @@
 //! Targets: textures, rows, batches, ranges of values.
 
-use veni_core::latent::Latent;
-use veni_core::sphere::Equirect;
+use veni_light::latent::Latent;
+use veni_light::sphere::Equirect;
 use veni_gpu::read_back::{Picture, bake_rows};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::TextureFormat;
@@ -9,7 +9,7 @@ use veni_gpu::{Bake, Error, GpuDecoder};
 
 use crate::util::{self, agrees, difference, filler, latent};
 
-fn cpu(model: &veni_core::model::Model, latent: &Latent, grid: Equirect) -> Vec<[f32; 3]> {
+fn cpu(model: &veni_light::model::Model, latent: &Latent, grid: Equirect) -> Vec<[f32; 3]> {
     let mut all = vec![[0.0; 3]; grid.len()];
     model.decoder().unwrap().condition(latent).unwrap().log_radiance_batch(&grid.directions(), &mut all);
     all

@@ -1,7 +1,7 @@
 //! The GPU against the CPU's field.
 
-use veni_core::model::Model;
-use veni_core::sphere::{CubeFace, Equirect, Frame};
+use veni_light::model::Model;
+use veni_light::sphere::{CubeFace, Equirect, Frame};
 use veni_gpu::decoder::KernelChoice;
 use veni_gpu::shader::{Grid, Kernel, Weights};
 use veni_gpu::{Bake, GpuDecoder};

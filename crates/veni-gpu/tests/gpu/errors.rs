@@ -1,7 +1,7 @@
 //! What does not fit is refused by name, and the host's device goes on.
 
-use veni_core::latent::Latent;
-use veni_core::sphere::{Equirect, Frame};
+use veni_light::latent::Latent;
+use veni_light::sphere::{Equirect, Frame};
 use veni_gpu::read_back::{self, Picture, bake_rows};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::{BufferUsages, TextureFormat, TextureUsages};

@@ -1,9 +1,9 @@
 //! Kernels run by hand from `shader` alone, as a host of another API would: text, constants, bindings, packed buffers,
 //! requests and dispatches. Other tests change the text on the way.
 
-use veni_core::latent::Latent;
-use veni_core::model::Model;
-use veni_core::sphere::Frame;
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_light::sphere::Frame;
 use veni_gpu::shader::twin::{Twin, listed, stored};
 use veni_gpu::shader::{
     Binding, Directions, ENTRY_POINT, Grid, Kernel, Request, Sizes, Store, Variant, Weights, pack_latent,

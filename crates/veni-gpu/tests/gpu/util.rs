@@ -4,8 +4,8 @@ use std::io::Write;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use veni_core::latent::{Latent, Prior};
-use veni_core::model::{DecoderConfig, Model, ModelConfig};
+use veni_light::latent::{Latent, Prior};
+use veni_light::model::{DecoderConfig, Model, ModelConfig};
 use veni_gpu::adapters::{self, Opened};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::{

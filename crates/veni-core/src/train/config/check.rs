@@ -1,8 +1,8 @@
 //! What types cannot say about a configuration.
 
 use super::{DecoderBy, LossGrid, TrainConfig};
-use crate::data::AugmentConfig;
-use crate::model::ModelKind;
+use veni_data::AugmentConfig;
+use veni_light::model::ModelKind;
 use crate::{Error, Result};
 
 impl TrainConfig {

@@ -16,13 +16,13 @@ pub use loss_grid::LossGrid;
 pub use report::{ReportConfig, Stored};
 pub use stage::{Stage, StageConfig};
 
-use crate::data::{AugmentConfig, DataConfig};
-use crate::model::ModelConfig;
+use veni_data::{AugmentConfig, DataConfig};
+use veni_light::model::ModelConfig;
 use crate::train::init::InitConfig;
 use crate::train::latents::LatentsConfig;
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
-use crate::train::schedule::LearningRate;
+use veni_fit::schedule::LearningRate;
 use crate::{Error, Result};
 
 /// A training run. Which system is trained is said by `model.kind`: the auto-encoder VENI, or the auto-decoder

@@ -3,7 +3,7 @@
 use toml::{Table, Value};
 
 use super::TrainConfig;
-use crate::train::schedule::LearningRate;
+use veni_fit::schedule::LearningRate;
 use crate::{Error, Result};
 
 impl TrainConfig {

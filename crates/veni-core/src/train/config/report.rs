@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::StoredType;
+use veni_light::model::StoredType;
 
 /// What a run writes beside its weights, and how often.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

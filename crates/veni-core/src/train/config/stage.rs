@@ -25,8 +25,8 @@ use toml::{Table, Value};
 
 use super::TrainConfig;
 use super::overrides::float_where_float;
-use crate::data::Holding;
-use crate::model::ModelKind;
+use veni_data::Holding;
+use veni_light::model::ModelKind;
 use crate::{Error, Result};
 
 /// What a stage may change: what neither the network, nor its state, nor the run's reports depend on.

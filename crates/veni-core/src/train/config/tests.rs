@@ -26,7 +26,7 @@ fn overrides_reach_every_level_and_keep_types() {
         ])
         .unwrap();
     assert_eq!(changed.steps, 500);
-    assert_eq!(changed.loss.kld, crate::train::schedule::WeightSchedule::Constant(1.0));
+    assert_eq!(changed.loss.kld, veni_fit::schedule::WeightSchedule::Constant(1.0));
     assert_eq!(changed.model.encoder.as_ref().unwrap().depth, 2);
     assert_eq!((changed.device, changed.order), (DeviceKind::Ndarray, Order::Shuffle));
     assert_eq!(changed.decoder.learning_rate.at(500), config.decoder.learning_rate.at(config.steps));
@@ -94,8 +94,8 @@ fn a_stage_is_the_run_with_its_changes() {
     // of other folders nothing is held back
     assert_eq!((a.config.data.fold, b.config.data.fold), (None, config.data.fold));
     assert_eq!(b.config.data, config.data);
-    assert_eq!(a.config.loss.kld, crate::train::schedule::WeightSchedule::Constant(1.0));
-    assert!(matches!(a.config.loss.mage, crate::train::schedule::WeightSchedule::Sigmoid { .. }));
+    assert_eq!(a.config.loss.kld, veni_fit::schedule::WeightSchedule::Constant(1.0));
+    assert!(matches!(a.config.loss.mage, veni_fit::schedule::WeightSchedule::Sigmoid { .. }));
     assert_eq!(b.config.loss, config.loss);
     assert_eq!(b.config.decoder.learning_rate, LearningRate::Constant { rate: 1e-5 });
     assert_eq!((a.config.augment.mix, b.config.augment.mix), (config.augment.mix, 0.0));

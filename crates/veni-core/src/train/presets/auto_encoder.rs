@@ -1,13 +1,13 @@
 //! VENI in the three sizes.
 
-use crate::data::{AugmentConfig, DataConfig};
-use crate::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
+use veni_data::{AugmentConfig, DataConfig};
+use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 use crate::train::config::{
     DecoderBy, DeviceKind, Devices, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig,
 };
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
-use crate::train::schedule::{LearningRate, WeightSchedule};
+use veni_fit::schedule::{LearningRate, WeightSchedule};
 
 /// Augmentation that keeps a sky a sky; chosen for a training set of some dozens.
 fn varied() -> AugmentConfig {

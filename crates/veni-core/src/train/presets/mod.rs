@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use toml::{Table, Value};
 
 use crate::train::config::{GroupConfig, StageConfig, TrainConfig};
-use crate::train::schedule::LearningRate;
+use veni_fit::schedule::LearningRate;
 use crate::{Error, Result};
 
 mod auto_decoder;

@@ -5,9 +5,9 @@ use std::fs;
 use std::io::Write;
 
 use super::*;
-use crate::data::{Heard, Holding};
-use crate::model::Model;
-use crate::output::{Overwrite, existing_above, write_atomic};
+use veni_data::{Heard, Holding};
+use veni_light::model::Model;
+use veni_light::output::{Overwrite, existing_above, write_atomic};
 use crate::train::init::{self, InitConfig};
 
 impl Trainer {
@@ -209,7 +209,7 @@ pub fn leftovers(folder: &Path) -> Result<Vec<PathBuf>> {
         }
         for entry in fs::read_dir(&folder).map_err(|e| Error::io(&folder, "list", e))? {
             let path = entry.map_err(|e| Error::io(&folder, "list", e))?.path();
-            if crate::output::is_part(&path) {
+            if veni_light::output::is_part(&path) {
                 found.push(path);
             }
         }

@@ -4,16 +4,16 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::*;
-use crate::data::DataConfig;
-use crate::data::coarsen::{averaged, coarse_grid};
-use crate::data::random::{Purpose, stream};
-use crate::eval::metrics::Alignment;
+use veni_data::DataConfig;
+use veni_data::coarsen::{averaged, coarse_grid};
+use veni_light::random::{Purpose, stream};
+use veni_image::metrics::Alignment;
 use crate::eval::reconstruction::Reconstruction;
 use crate::fit::{FitTarget, fit};
-use crate::latent::{Latent, Prior};
-use crate::model::{Model, ModelInfo, Training};
-use crate::output::Overwrite;
-use crate::sphere::Equirect;
+use veni_light::latent::{Latent, Prior};
+use veni_light::model::{Model, ModelInfo, Training};
+use veni_light::output::Overwrite;
+use veni_light::sphere::Equirect;
 use crate::train::batch::Batches;
 use crate::train::init::InitConfig;
 use crate::train::latents::{self, LatentsConfig};
@@ -253,7 +253,7 @@ impl Trainer {
     }
 }
 
-fn views(items: &[crate::data::Item]) -> Vec<&[f32]> {
+fn views(items: &[veni_data::Item]) -> Vec<&[f32]> {
     items.iter().map(|item| item.log_radiance.fetched()).collect()
 }
 

@@ -1,6 +1,6 @@
 //! The Vector-Neuron invariants of the latent vectors.
 
-use crate::model::VnReluForm;
+use veni_light::model::VnReluForm;
 use crate::nn::uniform;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};

@@ -1,6 +1,6 @@
 //! The input order of RENI (2022).
 
-use crate::model::{Conditioning, DecoderConfig, Equivariance, Invariance};
+use veni_light::model::{Conditioning, DecoderConfig, Equivariance, Invariance};
 
 /// For every input of RENI (2022)'s first map, in its order, which row of [`Decoder::input`](super::Decoder::input)
 /// it is: the program of 2022 stacks them otherwise. Their other maps have one order.

@@ -1,6 +1,6 @@
 //! The directional input: products of latent and direction, encoded by sines.
 
-use crate::model::Equivariance;
+use veni_light::model::Equivariance;
 use burn::tensor::{Tensor, TensorData};
 use std::f32::consts::TAU;
 

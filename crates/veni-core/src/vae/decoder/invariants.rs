@@ -2,7 +2,7 @@
 
 use super::Condition;
 use super::input::encode;
-use crate::model::{DecoderConfig, Equivariance, Invariance};
+use veni_light::model::{DecoderConfig, Equivariance, Invariance};
 use burn::tensor::Tensor;
 
 /// All of it as one vector per image: latents [B, N, 3] → [B, C].

@@ -31,7 +31,7 @@ pub use linear::Linear;
 pub use native::Native;
 pub use tokens::{Memory, TokenLayer, Tokens};
 
-use crate::model::{Conditioning, DecoderConfig};
+use veni_light::model::{Conditioning, DecoderConfig};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
@@ -73,7 +73,7 @@ impl Decoder {
     /// [`Condition::new`]).
     ///
     /// # Panics
-    /// If `config` is inconsistent ([`ModelConfig::validate`](crate::model::ModelConfig::validate)).
+    /// If `config` is inconsistent ([`ModelConfig::validate`](veni_light::model::ModelConfig::validate)).
     pub fn new(config: &DecoderConfig, latent_vectors: usize, rng: &mut impl Rng, device: &Device) -> Self {
         let (n, hidden, conditioning) = (latent_vectors, config.hidden, config.conditioning);
         let (directional, told) = (config.direction_inputs(n), config.condition_inputs(n));

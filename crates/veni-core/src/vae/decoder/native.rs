@@ -1,4 +1,4 @@
-//! The decoder by the vectorised kernels of [`field`](crate::field) in training, values and gradients, in place of
+//! The decoder by the vectorised kernels of [`field`](veni_light::field) in training, values and gradients, in place of
 //! tensor operations.
 //!
 //! Conditioning stays on the graph: the latent's products, one vector per layer and image. What runs for every
@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::{Decoder, Layers, invariants};
-use crate::field::bfloat16::Bfloat16;
-use crate::field::gradient::perceptron::{Image, Perceptron};
+use veni_light::field::bfloat16::Bfloat16;
+use veni_light::field::gradient::perceptron::{Image, Perceptron};
 use crate::{Error, Result};
 
 /// A decoder with the latents of a batch, on the processor.
@@ -32,7 +32,7 @@ impl Decoder {
     ///
     /// # Errors
     /// [`Error::Unsupported`] if the network does not fold per latent
-    /// ([`check_folds`](crate::model::DecoderConfig::check_folds)).
+    /// ([`check_folds`](veni_light::model::DecoderConfig::check_folds)).
     ///
     /// # Panics
     /// If the latents are of another shape.

@@ -1,6 +1,6 @@
 //! From the output map to log radiance.
 
-use crate::model::{DecoderConfig, OutputForm};
+use veni_light::model::{DecoderConfig, OutputForm};
 use burn::tensor::Tensor;
 
 /// Log radiance of the output map's y [B, R, 3].

@@ -1,8 +1,8 @@
 //! Networks of sines: SIREN (concat conditioning) and its modulated form (FiLM).
 
 use super::Linear;
-use crate::model::DecoderConfig;
-use crate::model::mapping_sizes;
+use veni_light::model::DecoderConfig;
+use veni_light::model::mapping_sizes;
 use crate::nn::{normal, uniform};
 use burn::tensor::{Device, Tensor, activation::leaky_relu};
 use rand::Rng;
@@ -40,7 +40,7 @@ fn map(bound: f64, inputs: usize, outputs: usize, rng: &mut impl Rng, device: &D
 
 /// ω of a network's maps at the start: FiLM's own, or the configured one.
 pub(super) fn initial_omega(config: &DecoderConfig) -> f64 {
-    if config.conditioning == crate::model::Conditioning::Film { INITIAL_FREQUENCY } else { config.omega }
+    if config.conditioning == veni_light::model::Conditioning::Film { INITIAL_FREQUENCY } else { config.omega }
 }
 
 /// FiLM's mapping network: weights normal with deviation √(2/(1 + 0.2²)/inputs) (He et al. 2015), those of the last

@@ -1,6 +1,6 @@
 use super::*;
-use crate::model::VnReluForm;
-use crate::sphere::Equirect;
+use veni_light::model::VnReluForm;
+use veni_light::sphere::Equirect;
 use crate::vae::weights;
 use burn::tensor::TensorData;
 use rand::SeedableRng;

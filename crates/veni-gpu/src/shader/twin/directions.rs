@@ -1,6 +1,6 @@
 //! `directions_grid.wgsl`
 
-use veni_core::sphere::{CubeFace, Equirect, Frame};
+use veni_light::sphere::{CubeFace, Equirect, Frame};
 
 use crate::shader::{Grid, Request};
 

@@ -29,7 +29,7 @@ use crate::Result;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DecoderBy {
-    /// The vectorised kernels of [`field`](crate::field), on the processor ([`Native`](crate::vae::Native)) whatever
+    /// The vectorised kernels of [`field`](veni_light::field), on the processor ([`Native`](crate::vae::Native)) whatever
     /// the device. A network that does not fold per latent is computed by tensor operations all the same.
     #[default]
     Kernels,

@@ -11,7 +11,7 @@ fn gradients_of_the_whole_loss_match_finite_differences() {
     // |·| has a kink at every pixel whose gradient error is 0; too many for a finite step in f32
     config.loss.mage = WeightSchedule::Constant(0.0);
     // one scene whatever the presets draw: others have kinks of the display curve within the step
-    config.augment = crate::data::AugmentConfig::default();
+    config.augment = veni_data::AugmentConfig::default();
     gradients_match(&folder.path().join("run"), config);
 }
 
@@ -55,7 +55,7 @@ fn gradients_match(run: &Path, config: TrainConfig) {
     for (slot, (name, gradient)) in (0..).zip(&gradients) {
         // along the gradient, where the slope is large, and a random direction, so that no component hides
         let mut rng = stream(5, Purpose::Fit, 0, slot);
-        let random: Vec<f64> = gradient.data.iter().map(|_| crate::data::random::normal(&mut rng)).collect();
+        let random: Vec<f64> = gradient.data.iter().map(|_| veni_light::random::normal(&mut rng)).collect();
         let gradient: Vec<f64> = gradient.data.iter().map(|g| f64::from(*g)).collect();
         let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-30);
         let (a, b) = (length(&gradient), length(&random));

@@ -1,7 +1,7 @@
 //! Runs on panoramas that are in a file.
 
 use super::*;
-use crate::data::Holding;
+use veni_data::Holding;
 
 /// The run with all panoramas in files.
 fn beyond_memory(config: &TrainConfig) -> TrainConfig {

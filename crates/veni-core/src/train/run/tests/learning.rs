@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn a_tiny_model_learns_two_panoramas() {
     let (folder, mut config) = setup(150);
-    config.augment = crate::data::AugmentConfig::default();
+    config.augment = veni_data::AugmentConfig::default();
     config.loss.kld = WeightSchedule::Constant(0.0);
     let out = folder.path().join("run");
     complete(&mut Trainer::create(&out, config, "test").unwrap());
@@ -36,7 +36,7 @@ fn an_auto_decoder_learns_its_panoramas_and_leaves_its_table() {
 
     let model = Model::load(out.join("model.safetensors")).unwrap();
     assert!(!model.has_encoder() && model.has_prior());
-    assert_eq!(model.config().kind, crate::model::ModelKind::Reni);
+    assert_eq!(model.config().kind, veni_light::model::ModelKind::Reni);
     // the paper's network: the lighting world decodes it
     assert!(model.decoder().unwrap().condition(&Latent::from_seed(&model.prior(), 1)).is_ok());
     let bytes = file(&out, "latents.safetensors");
@@ -74,7 +74,7 @@ fn every_way_to_condition_learns_in_both_systems() {
                 "report.validate_every=0".to_owned(),
             ];
             let mut config = config.with_overrides(&options).unwrap();
-            config.augment = crate::data::AugmentConfig::default();
+            config.augment = veni_data::AugmentConfig::default();
             let (folder, config) = setup_of(config, 60);
             let out = folder.path().join("run");
             complete(&mut Trainer::create(&out, config.clone(), "test").unwrap());

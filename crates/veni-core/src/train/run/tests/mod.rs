@@ -9,15 +9,15 @@ mod resuming;
 mod stages;
 
 use super::*;
-use crate::data::random::{Purpose, stream};
-use crate::latent::Latent;
-use crate::model::Model;
-use crate::panorama::{Panorama, Precision, WriteFormat, WriteOptions};
-use crate::sphere::Equirect;
+use veni_light::random::{Purpose, stream};
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
+use veni_light::sphere::Equirect;
 use crate::train::config::{DecoderBy, DeviceKind, Devices};
 use crate::train::loss::LossForm;
 use crate::train::presets::Preset;
-use crate::train::schedule::{LearningRate, WeightSchedule};
+use veni_fit::schedule::{LearningRate, WeightSchedule};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// A sky with a sun at `azimuth` over dark ground.

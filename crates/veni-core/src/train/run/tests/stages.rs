@@ -40,7 +40,7 @@ fn each_stage_has_its_own_data_rates_and_schedules() {
     let out = folder.path().join("run");
     let mut trainer = Trainer::create(&out, config.clone(), "test").unwrap();
     let own = trainer.stages[0].data.as_ref().unwrap();
-    let names: Vec<_> = own.items().iter().map(crate::data::Item::name).collect();
+    let names: Vec<_> = own.items().iter().map(veni_data::Item::name).collect();
     assert_eq!(names, ["d", "e"], "what validates is not trained on");
     complete(&mut trainer);
     let text = String::from_utf8(file(&out, "metrics.jsonl")).unwrap();

@@ -120,7 +120,7 @@ fn a_changed_weight_is_seen_by_the_comparison() {
 fn a_network_that_does_not_fold_is_refused_by_name() {
     let device = Device::flex();
     let config = DecoderConfig {
-        conditioning: crate::model::Conditioning::Tokens,
+        conditioning: veni_light::model::Conditioning::Tokens,
         hidden: 16,
         heads: 2,
         ..DecoderConfig::default()

@@ -1,8 +1,8 @@
 //! The systems that the paper's network is compared with.
 
 use super::*;
-use crate::data::random::{Purpose, stream};
-use crate::model::{
+use veni_light::random::{Purpose, stream};
+use veni_light::model::{
     Conditioning, Encoding, Equivariance, Invariance, Model, ModelConfig, ModelInfo, OutputForm,
 };
 use crate::vae::decoder::TokenLayer;
@@ -62,7 +62,7 @@ fn tensors_are_those_of_the_schema_and_come_back_from_a_model_file() {
             let config = ModelConfig { decoder, ..ModelConfig::decode_only(N) };
             // refuses what the schema does not have
             let model = model_of(weights.clone(), &config, ModelInfo::default()).unwrap();
-            let bytes = model.to_bytes(crate::model::StoredType::F32).unwrap();
+            let bytes = model.to_bytes(veni_light::model::StoredType::F32).unwrap();
             let model = Model::from_bytes(&bytes).unwrap();
             assert_eq!(model.config(), &config);
             assert!(weights.iter().all(|(name, w)| model.tensor(name).is_some_and(|t| t.data == w.data)));

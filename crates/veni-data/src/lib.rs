@@ -1,0 +1,28 @@
+//! Panoramas for training: preparing, expanding, loading, splitting, augmenting.
+//!
+//! An image here is natural-log radiance on an equirectangular grid (H × W × 3, row-major, channels last) at
+//! exposure 0; what was subtracted is kept beside it.
+
+pub mod augment;
+pub mod coarsen;
+mod dataset;
+pub mod expand;
+pub mod exposure;
+mod fold;
+mod holding;
+pub mod parallel;
+mod pixels;
+pub mod prepare;
+mod reconstruction;
+mod splits;
+mod store;
+
+pub use veni_light::{Error, Result};
+
+pub use augment::AugmentConfig;
+pub use dataset::{Dataset, Heard, Item, panorama_files};
+pub use fold::Fold;
+pub use holding::Holding;
+pub use pixels::Pixels;
+pub use reconstruction::Reconstruction;
+pub use splits::{DataConfig, Splits};

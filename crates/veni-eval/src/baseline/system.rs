@@ -1,0 +1,109 @@
+//! Which system, of which size.
+
+use super::fitted::{Field, Fitted};
+use super::gaussians::{Gaussians, Search};
+use super::harmonics::Harmonics;
+use super::target::{Space, Target};
+use veni_light::sphere::Equirect;
+use crate::{Error, Result};
+
+/// A family of systems.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// [`Baseline::SphericalHarmonics`].
+    SphericalHarmonics,
+    /// [`Baseline::SphericalGaussians`].
+    SphericalGaussians,
+    /// [`Baseline::GaussianMixture`].
+    GaussianMixture,
+}
+
+/// A system to compare with; see the [module](super).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Baseline {
+    /// Real spherical harmonics up to order L: 3(L+1)² numbers. Solved in closed form.
+    SphericalHarmonics {
+        /// L.
+        order: usize,
+        /// What is expanded.
+        space: Space,
+    },
+    /// f = b + Σ_g a_g e^{λ_g(⟨μ_g,d⟩−1)}, a of either sign: 6 numbers per lobe and 3 for b.
+    SphericalGaussians {
+        /// K.
+        lobes: usize,
+        /// What is expanded.
+        space: Space,
+        /// How the lobes are searched.
+        search: Search,
+    },
+    /// L = b + Σ_g a_g e^{λ_g(⟨μ_g,d⟩−1)} with a, b > 0, and the squared error of ln L least: 6 numbers per lobe and 3
+    /// for b.
+    GaussianMixture {
+        /// K.
+        lobes: usize,
+        /// How the lobes are searched.
+        search: Search,
+    },
+}
+
+impl Baseline {
+    /// The largest system of this kind that spends at most `dimension` numbers: harmonics of order ⌊√(D/3)⌋ − 1,
+    /// or ⌊(D−3)/6⌋ lobes and a constant. D = 27, 147, 300 give L = 2, 6, 9 (27, 147, 300 numbers) and
+    /// K = 4, 24, 49 (27, 147, 297 numbers). A mixture expands radiance by definition; `space` is for the others.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if not even a constant fits into `dimension`.
+    pub fn from_dimension(kind: Kind, dimension: usize, space: Space) -> Result<Self> {
+        if dimension < 3 {
+            return Err(Error::invalid(format!(
+                "a baseline of {dimension} numbers: a constant colour already takes 3"
+            )));
+        }
+        let (lobes, search) = ((dimension - 3) / 6, Search::default());
+        Ok(match kind {
+            Kind::SphericalHarmonics => {
+                Self::SphericalHarmonics { order: (dimension / 3).isqrt() - 1, space }
+            }
+            Kind::SphericalGaussians => Self::SphericalGaussians { lobes, space, search },
+            Kind::GaussianMixture => Self::GaussianMixture { lobes, search },
+        })
+    }
+
+    /// Numbers that a fit of this system consists of.
+    pub fn dimension(&self) -> usize {
+        match *self {
+            Self::SphericalHarmonics { order, .. } => 3 * (order + 1) * (order + 1),
+            Self::SphericalGaussians { lobes, .. } | Self::GaussianMixture { lobes, .. } => 6 * lobes + 3,
+        }
+    }
+
+    /// The quantity that a fit of this system is an expansion of.
+    pub fn space(&self) -> Space {
+        match *self {
+            Self::SphericalHarmonics { space, .. } | Self::SphericalGaussians { space, .. } => space,
+            Self::GaussianMixture { .. } => Space::Linear,
+        }
+    }
+
+    /// Fits the system to an image of natural-log radiance, `[height, width, 3]` on the pixel centres of `grid`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the image does not have 3·W·H values, has one that is no logarithm of an f32, or has
+    /// too few pixels for the system; or if the search has no start or a rate outside (0, 1].
+    pub fn fit(&self, grid: Equirect, log_radiance: &[f32]) -> Result<Fitted> {
+        let target = |space| Target::new(grid, log_radiance, space);
+        let field = match self {
+            Self::SphericalHarmonics { order, space } => {
+                Field::Harmonics(Harmonics::fit(*order, &target(*space)?)?)
+            }
+            Self::SphericalGaussians { lobes, space, search } => {
+                Field::Gaussians(Gaussians::fit(*lobes, &target(*space)?, search)?)
+            }
+            Self::GaussianMixture { lobes, search } => {
+                Field::Gaussians(Gaussians::fit_mixture(*lobes, &target(Space::Log)?, search)?)
+            }
+        };
+        Ok(Fitted { space: self.space(), field })
+    }
+}

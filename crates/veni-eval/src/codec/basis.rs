@@ -1,0 +1,93 @@
+//! The classical bases: spherical harmonics and spherical Gaussians of as many numbers.
+
+use serde_json::{Value, json};
+
+use super::Codec;
+use crate::baseline::{Baseline, Fitted, Kind, Space};
+use veni_light::sphere::Equirect;
+use crate::{Error, Result};
+
+/// A basis fitted to each image.
+#[derive(Clone, Debug)]
+pub struct Basis {
+    system: Baseline,
+    name: String,
+}
+
+impl Basis {
+    /// The largest system of this kind, in log radiance, that spends at most `dimension` numbers.
+    ///
+    /// # Errors
+    /// As [`Baseline::from_dimension`].
+    pub fn new(kind: Kind, dimension: usize) -> Result<Self> {
+        let system = Baseline::from_dimension(kind, dimension, Space::Log)?;
+        let name = match kind {
+            Kind::SphericalHarmonics => "SH",
+            Kind::SphericalGaussians => "SG",
+            Kind::GaussianMixture => "SG mixture",
+        };
+        Ok(Self { name: format!("{name} {}", system.dimension()), system })
+    }
+}
+
+impl Codec for Basis {
+    fn system(&self) -> &str {
+        &self.name
+    }
+
+    fn pass(&self) -> &str {
+        match self.system {
+            Baseline::SphericalHarmonics { .. } => "least squares",
+            Baseline::SphericalGaussians { .. } | Baseline::GaussianMixture { .. } => "optimised",
+        }
+    }
+
+    fn dimension(&self) -> usize {
+        self.system.dimension()
+    }
+
+    fn key(&self) -> Value {
+        // sizes, space and search
+        json!({ "baseline": format!("{:?}", self.system) })
+    }
+
+    fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
+        let fitted = self.system.fit(grid, image).map_err(|e| self.named(&e))?;
+        Ok(fitted.parameters().into_iter().map(|v| v as f32).collect())
+    }
+
+    fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>> {
+        let parameters: Vec<_> = code.iter().map(|v| f64::from(*v)).collect();
+        let fitted = Fitted::from_parameters(&self.system, &parameters).map_err(|e| self.named(&e))?;
+        Ok(fitted.log_radiance(&grid.directions()).into_flattened())
+    }
+}
+
+impl Basis {
+    fn named(&self, error: &Error) -> Error {
+        Error::invalid(format!("{}: {error}", self.name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_code_is_as_long_as_it_says_and_gives_the_image_back() {
+        let grid = Equirect::new(16, 8);
+        let sky: Vec<f32> = grid.directions().iter().flat_map(|d| [d[2], 0.5 * d[0], 1.0]).collect();
+        for kind in [Kind::SphericalHarmonics, Kind::SphericalGaussians, Kind::GaussianMixture] {
+            let basis = Basis::new(kind, 27).unwrap();
+            let code = basis.encode(grid, &sky).unwrap();
+            assert_eq!((code.len(), basis.dimension()), (27, 27), "{kind:?}");
+            let image = basis.decode(grid, &code).unwrap();
+            let worst = image.iter().zip(&sky).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(worst < 0.3, "{kind:?}: {worst}");
+        }
+        assert_ne!(
+            Basis::new(Kind::SphericalHarmonics, 27).unwrap().key(),
+            Basis::new(Kind::SphericalHarmonics, 147).unwrap().key()
+        );
+    }
+}

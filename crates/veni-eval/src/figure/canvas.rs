@@ -1,0 +1,89 @@
+//! Pixels to draw on, and the file they end in.
+
+use std::convert::Infallible;
+use std::path::Path;
+
+use embedded_graphics::mono_font::{MonoTextStyle, iso_8859_1::FONT_6X10};
+use embedded_graphics::pixelcolor::Rgb888;
+use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, Point, RgbColor, Size};
+use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
+use image::{ImageFormat, Rgb, RgbImage};
+
+use veni_light::output::{Overwrite, write_atomic};
+use crate::{Error, Result};
+
+/// Width and height of a letter, pixels.
+pub(super) const LETTER: [i32; 2] = [6, 10];
+
+/// An 8-bit sRGB picture that starts white.
+#[derive(Clone, Debug)]
+pub struct Canvas {
+    image: RgbImage,
+}
+
+impl Canvas {
+    /// `width` × `height` white pixels.
+    pub fn new(width: usize, height: usize) -> Self {
+        // figures are some thousands of pixels a side
+        Self { image: RgbImage::from_pixel(width as u32, height as u32, Rgb([255; 3])) }
+    }
+
+    /// The picture.
+    pub fn image(&self) -> &RgbImage {
+        &self.image
+    }
+
+    /// Sets a pixel; one outside is left out.
+    pub(super) fn set(&mut self, [x, y]: [i32; 2], colour: [u8; 3]) {
+        if let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y))
+            && x < self.image.width()
+            && y < self.image.height()
+        {
+            self.image.put_pixel(x, y, Rgb(colour));
+        }
+    }
+
+    /// Draws a shape; drawing on pixels in memory cannot fail.
+    pub(super) fn draw(&mut self, shape: &impl Drawable<Color = Rgb888>) {
+        let Ok(_) = shape.draw(self);
+    }
+
+    /// Writes black text, its vertical middle at `at`; letters beyond Latin-1 appear as "?".
+    pub(super) fn text(&mut self, text: &str, [x, y]: [i32; 2], alignment: Alignment) {
+        let style = TextStyleBuilder::new().alignment(alignment).baseline(Baseline::Middle).build();
+        let letters = MonoTextStyle::new(&FONT_6X10, Rgb888::BLACK);
+        self.draw(&Text::with_text_style(text, Point::new(x, y), letters, style));
+    }
+
+    /// Writes the PNG, replacing an earlier one.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+        }
+        write_atomic(path, Overwrite::Replace, |out| {
+            let written = self.image.write_to(out, ImageFormat::Png);
+            written.map_err(|e| Error::invalid(format!("{}: {e}", path.display())))
+        })
+    }
+}
+
+impl OriginDimensions for Canvas {
+    fn size(&self) -> Size {
+        Size::new(self.image.width(), self.image.height())
+    }
+}
+
+impl DrawTarget for Canvas {
+    type Color = Rgb888;
+    type Error = Infallible;
+
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Infallible> {
+        for Pixel(Point { x, y }, colour) in pixels {
+            self.set([x, y], [colour.r(), colour.g(), colour.b()]);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,83 @@
+//! The one place where evaluation calls the latent optimiser.
+
+use serde_json::{Value, json};
+
+use super::subject::Subject;
+use crate::Result;
+use veni_data::coarsen::{averaged, coarse_grid};
+use veni_core::fit::{self, FitConfig, FitResult, FitTarget, Method};
+use veni_light::latent::Latent;
+use veni_light::sphere::Equirect;
+
+/// How a latent is fitted to an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitSettings {
+    /// Objective, steps, rates.
+    pub config: FitConfig,
+    /// The fit sees means over so many by so many pixels.
+    pub factor: usize,
+}
+
+impl FitSettings {
+    /// [`FitConfig::thorough`] on a quarter of the pixels; `quick`: at most 100 steps on a sixteenth.
+    pub fn thorough(grid: Equirect, quick: bool) -> Self {
+        let config = FitConfig::thorough();
+        let config = if quick { config.in_steps(100) } else { config };
+        Self { config, factor: dividing(grid, if quick { 4 } else { 2 }) }
+    }
+
+    /// The authors' helper: 2000 steps on every pixel, rates from `rates[0]` to `rates[1]`; `quick`: 300 steps on a
+    /// sixteenth of the pixels.
+    pub fn reference(grid: Equirect, rates: [f64; 2], quick: bool) -> Self {
+        let [first, last] = rates;
+        let steps = if quick { 300 } else { 2000 };
+        let config = FitConfig::reference_helper(first, last, steps);
+        Self { config, factor: if quick { dividing(grid, 4) } else { 1 } }
+    }
+
+    /// Everything that decides a result.
+    pub fn key(&self) -> Value {
+        json!({ "config": self.config, "factor": self.factor })
+    }
+
+    /// In words, for tables.
+    pub fn describe(&self) -> String {
+        let every = match self.factor {
+            1 => "every pixel".to_owned(),
+            n => format!("means over {n} × {n} pixels"),
+        };
+        let steps = self.config.steps;
+        match self.config.method {
+            Method::Adam => format!("{steps} Adam steps on {every}"),
+            Method::LevenbergMarquardt => format!("Levenberg–Marquardt to the end on {every}"),
+            Method::Auto => format!(
+                "Levenberg–Marquardt to the end, with more than 16 vectors after {steps} exploring Adam steps (where it \
+                 does not apply: those alone), on {every}"
+            ),
+        }
+    }
+
+    /// Fits one latent to each image (log radiance at exposure 0 on `grid`).
+    ///
+    /// # Errors
+    /// As [`fit::fit`].
+    pub fn fit(
+        &self,
+        subject: &Subject,
+        grid: Equirect,
+        images: &[&[f32]],
+        start: &[Latent],
+    ) -> Result<FitResult> {
+        let images: Vec<_> = images.iter().map(|image| averaged(grid, image, self.factor)).collect();
+        let images: Vec<_> = images.iter().map(Vec::as_slice).collect();
+        let grid = coarse_grid(grid, self.factor);
+        let target = FitTarget::panoramas(grid, &images);
+        fit::fit(subject.fit_decoder(), &target, start, &self.config)
+    }
+}
+
+/// The largest of `most`, `most`/2, … that divides both sides.
+fn dividing(grid: Equirect, most: usize) -> usize {
+    let divides = |n: &usize| grid.width.is_multiple_of(*n) && grid.height.is_multiple_of(*n);
+    std::iter::successors(Some(most), |n| (*n > 1).then_some(n / 2)).find(divides).unwrap_or(1)
+}

@@ -1,0 +1,156 @@
+//! The experiments of the paper, each with a name, fixed seeds and an exact definition (docs/MODEL.md, Evaluation).
+//!
+//! | protocol | question |
+//! |---|---|
+//! | [`reconstruction`] | how much of a panorama survives D numbers? |
+//! | [`uniqueness`] | do two fits of one panorama end in the same place of latent space? |
+//! | [`consistency`] | are latents that are far apart panoramas that are far apart? |
+//! | [`interpolation`] | is the way from one panorama to another even? |
+//! | [`equivariance`] | does the latent turn with the panorama? |
+//! | [`dataset_size`] | what is more training data worth? |
+//! | [`ablations`] | what is each part of the model worth? |
+//! | [`inverse_rendering`] | what does a shaded ball tell of the light on it? |
+//! | [`paper`] | all of them, with published numbers beside ours |
+//!
+//! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image; a
+//! [`Share`] of it can be computed beforehand, elsewhere.
+
+pub mod ablations;
+pub mod consistency;
+pub mod dataset_size;
+pub mod equivariance;
+pub mod interpolation;
+pub mod inverse_rendering;
+pub mod paper;
+mod published;
+mod quality;
+pub mod reconstruction;
+mod share;
+#[cfg(test)]
+mod tests;
+pub mod uniqueness;
+mod work;
+
+use std::path::{Path, PathBuf};
+
+pub use published::Published;
+pub use share::Share;
+
+use super::codec::{Autoencoder, Codec, Optimised};
+use super::figure::{Plot, Sheet};
+use super::fitting::FitSettings;
+use super::lpips::Lpips;
+use super::store::Store;
+use super::subject::Subject;
+use super::table::Table;
+use crate::Result;
+use veni_data::Dataset;
+
+/// What can be chosen about the protocols.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Fewer steps, fewer pixels, fewer pairs: to see a trend in minutes.
+    pub quick: bool,
+    /// Pairs of random latents (consistency); absent: 1000, or 200 in quick.
+    pub pairs: Option<usize>,
+    /// Frames of an interpolation, both ends included; at least 3.
+    pub frames: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { seed: 0, quick: false, pairs: None, frames: 9 }
+    }
+}
+
+/// Hears how far an evaluation has come. Several threads tell it.
+pub trait Watch: Sync {
+    /// A task begins that takes `total` units ("panorama"), `done` of them kept from an earlier run.
+    fn begin(&self, unit: &'static str, task: &str, done: usize, total: usize);
+
+    /// So many more units are done.
+    fn advance(&self, units: usize);
+}
+
+/// Everything that a protocol works with.
+#[derive(Clone, Copy)]
+pub struct Evaluation<'a> {
+    /// The models.
+    pub subjects: &'a [Subject],
+    /// Rows beside the models' own in reconstruction tables: classical bases of equal D.
+    pub others: &'a [&'a dyn Codec],
+    /// The panoramas.
+    pub data: &'a Dataset,
+    /// LPIPS, if there are weights for it.
+    pub lpips: Option<&'a Lpips>,
+    /// Seeds and effort.
+    pub settings: Settings,
+    /// Where results are kept.
+    pub store: &'a Store,
+    /// The folder of figures.
+    pub figures: &'a Path,
+    /// Who hears of progress.
+    pub watch: &'a dyn Watch,
+}
+
+/// What a protocol found.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// The answer: one table per protocol.
+    pub tables: Vec<Table>,
+    /// Tables of every panorama or pair behind it.
+    pub details: Vec<Table>,
+    /// Files that were written.
+    pub figures: Vec<PathBuf>,
+}
+
+impl std::fmt::Debug for Evaluation<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let names: Vec<_> = self.subjects.iter().map(Subject::name).collect();
+        f.debug_struct("Evaluation")
+            .field("subjects", &names)
+            .field("panoramas", &self.data.len())
+            .field("settings", &self.settings)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Evaluation<'a> {
+    /// The models' passes that are compared: autoencoder where there is an encoder, and optimised.
+    fn codecs(&self, subject: &'a Subject) -> Vec<Box<dyn Codec + 'a>> {
+        let fit = FitSettings::thorough(self.data.grid(), self.settings.quick);
+        let pass = Autoencoder::new(subject).map(|codec| Box::new(codec) as Box<dyn Codec>);
+        pass.into_iter().chain([Box::new(Optimised::new(subject, fit)) as Box<dyn Codec>]).collect()
+    }
+
+    /// How the optimised pass fits, in words.
+    fn optimised_note(&self) -> String {
+        let fit = FitSettings::thorough(self.data.grid(), self.settings.quick);
+        format!(
+            "Optimised: {} from the encoder's latent (from 0 without encoder), solid-angle-weighted log error; where \
+             the encoder's latent has the higher LDR PSNR (exp.), it stays.",
+            fit.describe()
+        )
+    }
+
+    fn plot(&self, name: &str, plot: &Plot, report: &mut Report) -> Result<()> {
+        let path = self.figures.join(format!("{}.png", file_name(name)));
+        plot.draw().write(&path)?;
+        report.figures.push(path);
+        Ok(())
+    }
+
+    fn sheet(&self, name: &str, sheet: &Sheet, report: &mut Report) -> Result<()> {
+        let path = self.figures.join(format!("{}.png", file_name(name)));
+        sheet.write(&path)?;
+        report.figures.push(path);
+        Ok(())
+    }
+}
+
+/// A model's name may hold anything, a file's name may not.
+fn file_name(name: &str) -> String {
+    name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
+}

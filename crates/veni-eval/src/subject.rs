@@ -1,0 +1,195 @@
+//! A model under evaluation.
+
+use std::sync::Arc;
+
+use burn::tensor::Device;
+
+use veni_light::field;
+use veni_core::fit::FitDecoder;
+use veni_light::latent::{Latent, Prior};
+use veni_light::model::{Model, ModelKind};
+use veni_light::sphere::{Equirect, Stripes};
+use veni_core::vae::weights::{self, Weight};
+use veni_core::vae::{Decoder, Veni, veni};
+use crate::{Error, Result};
+
+/// A model and everything that the protocols ask of it. A model without an encoder (RENI++, or a stripped file) takes part
+/// wherever no encoder is needed.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    name: String,
+    identity: String,
+    model: Arc<Model>,
+    decoder: Arc<Decoding>,
+    device: Device,
+}
+
+/// How the decoder is evaluated. Both give the same values.
+#[derive(Debug)]
+enum Decoding {
+    /// The auto-encoder, and its field folded per latent where the network folds.
+    Whole { veni: Box<Veni>, field: Option<field::Decoder> },
+    /// A decoder alone.
+    Alone { network: Box<Decoder>, field: Option<field::Decoder> },
+}
+
+impl Subject {
+    /// A model under a name for tables, with its networks on `device` (without gradient tracking).
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the model's tensors are not those its configuration implies.
+    pub fn new(name: impl Into<String>, model: Model, device: &Device) -> Result<Self> {
+        // networks that do not fold are evaluated as graphs of tensors
+        let field = match model.decoder() {
+            Ok(field) => Some(field),
+            Err(Error::Unsupported(_)) => None,
+            Err(error) => return Err(error),
+        };
+        let decoder = if model.has_encoder() {
+            Decoding::Whole { veni: Box::new(Veni::from_model(&model, device)?), field }
+        } else {
+            Decoding::Alone { network: Box::new(decoder_alone(&model, device)?), field }
+        };
+        Ok(Self {
+            name: name.into(),
+            identity: model.digest(),
+            model: Arc::new(model),
+            decoder: Arc::new(decoder),
+            device: device.clone(),
+        })
+    }
+
+    /// What holds its networks.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// What to call it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Identity of the whole model, encoder included: 16 hexadecimal digits.
+    pub fn identity(&self) -> &str {
+        &self.identity
+    }
+
+    /// The model file's content.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Auto-encoder or auto-decoder.
+    pub fn kind(&self) -> ModelKind {
+        self.model.config().kind
+    }
+
+    /// N, the number of latent vectors.
+    pub fn latent_vectors(&self) -> usize {
+        self.model.latent_vectors()
+    }
+
+    /// D = 3N, the paper's size of a code.
+    pub fn dimension(&self) -> usize {
+        3 * self.latent_vectors()
+    }
+
+    /// The distribution of its training latents; the standard normal if the file has none.
+    pub fn prior(&self) -> Prior {
+        self.model.prior()
+    }
+
+    /// The auto-encoder, if there is an encoder.
+    pub fn veni(&self) -> Option<&Veni> {
+        match &*self.decoder {
+            Decoding::Whole { veni, .. } => Some(veni),
+            Decoding::Alone { .. } => None,
+        }
+    }
+
+    /// The decoder as a network of tensors.
+    pub fn network(&self) -> &Decoder {
+        match &*self.decoder {
+            Decoding::Whole { veni, .. } => &veni.decoder,
+            Decoding::Alone { network, .. } => network,
+        }
+    }
+
+    /// The decoder folded per latent, if its network folds.
+    pub fn field(&self) -> Option<&field::Decoder> {
+        let (Decoding::Whole { field, .. } | Decoding::Alone { field, .. }) = &*self.decoder;
+        field.as_ref()
+    }
+
+    /// The decoder as fits take it: folded where it folds.
+    pub fn fit_decoder(&self) -> FitDecoder<'_> {
+        self.field().map_or_else(|| FitDecoder::Graph(self.network()), FitDecoder::Folded)
+    }
+
+    /// Where the encoder looks, if there is one.
+    ///
+    /// # Errors
+    /// As [`Veni::stripes`].
+    pub fn stripes(&self) -> Result<Option<Stripes>> {
+        self.veni().map(Veni::stripes).transpose()
+    }
+
+    /// The means of the encoder's posteriors for images of log radiance at exposure 0.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if there is no encoder; otherwise as [`Veni::encode`].
+    pub fn encode(&self, grid: Equirect, images: &[&[f32]]) -> Result<Vec<Latent>> {
+        let veni =
+            self.veni().ok_or_else(|| Error::invalid(format!("{}: this model has no encoder", self.name)))?;
+        Ok(veni.encode(grid, images)?.into_iter().map(|e| Latent::new(e.vectors)).collect())
+    }
+
+    /// Log radiance at the latents' exposures on every pixel, 3·W·H values each.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the model if a latent is none of its own or too large to decode.
+    pub fn decode(&self, grid: Equirect, latents: &[Latent]) -> Result<Vec<Vec<f32>>> {
+        let Some(field) = self.field() else {
+            let vectors: Vec<_> = latents.iter().map(|z| z.vectors.clone()).collect();
+            let mut images = veni::decode(self.network(), grid, &vectors);
+            for (image, z) in images.iter_mut().zip(latents) {
+                image.iter_mut().for_each(|v| *v += z.log_exposure);
+            }
+            return Ok(images);
+        };
+        let directions = grid.directions();
+        let one = |z: &Latent| {
+            let field = field.condition(z).map_err(|e| Error::invalid(format!("{}: {e}", self.name)))?;
+            let mut image = vec![[0.0; 3]; directions.len()];
+            field.log_radiance_batch(&directions, &mut image);
+            Ok(image.into_flattened())
+        };
+        latents.iter().map(one).collect()
+    }
+
+    /// Trainable numbers of (encoder, decoder).
+    pub fn parameters(&self) -> [usize; 2] {
+        let count = |prefix: &str| {
+            let own = self.model.tensors().iter().filter(|(name, _)| name.starts_with(prefix));
+            own.map(|(_, t)| t.data.len()).sum()
+        };
+        [count("encoder."), count("decoder.")]
+    }
+
+    /// How many panoramas it was trained on, if its file says so ("76 panoramas of …").
+    pub fn training_panoramas(&self) -> Option<usize> {
+        let data = &self.model.info().training.as_ref()?.data;
+        let (count, rest) = data.split_once(' ')?;
+        count.parse().ok().filter(|_| rest.starts_with("panorama"))
+    }
+}
+
+fn decoder_alone(model: &Model, device: &Device) -> Result<Decoder> {
+    // every weight is replaced; the generator's only part is to give them a shape
+    let mut rng: rand_chacha::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
+    let decoder = Decoder::new(&model.config().decoder, model.latent_vectors(), &mut rng, device);
+    let tensors = model.tensors().iter().filter(|(name, _)| name.starts_with("decoder."));
+    let weights =
+        tensors.map(|(name, t)| (name.clone(), Weight { shape: t.shape.clone(), data: t.data.clone() }));
+    weights::write(decoder, "decoder", &weights.collect())
+}

@@ -1,0 +1,182 @@
+//! The ways down: Adam on everything at once, Levenberg–Marquardt image by image.
+
+use super::FitResult;
+use super::adam::Variable;
+use super::config::{FitConfig, Method};
+use super::levenberg_marquardt::{Search, Slopes};
+use super::network::{Evaluation, ImageLoss, Network};
+use super::pixel::PixelLoss;
+use super::plateau::PlateauDetector;
+use veni_light::latent::{Latent, Prior};
+use crate::{Error, Result};
+
+/// Latents and exposures with a low loss, by the configured method.
+pub(super) fn optimise(
+    network: &Network<'_>,
+    loss: &ImageLoss<'_>,
+    prior: Option<&Prior>,
+    start: &[Latent],
+    config: &FitConfig,
+    watch: &mut dyn FnMut(u64, f64),
+) -> Result<FitResult> {
+    let n = start.first().map_or(0, |z| z.vectors.len());
+    let standard = Prior::standard(n);
+    let penalty = Penalty { prior: prior.unwrap_or(&standard), scale: config.prior / n.max(1) as f64 };
+    let pixels = match loss {
+        ImageLoss::Pixels(images) if network.is_folded() => Some(images.as_slice()),
+        _ if config.method == Method::LevenbergMarquardt => return Err(unsuited(loss)),
+        _ => None,
+    };
+    let [explore, finish] = config.plan(n, pixels.is_some());
+    let descent = Descent { network, loss, penalty: &penalty, config };
+    let mut trace = Trace { losses: Vec::new(), watch };
+    let mut latents = start.to_vec();
+    if explore > 0 {
+        latents = descent.adam(&latents, explore, &mut trace)?;
+    }
+    if let Some(images) = pixels.filter(|_| finish > 0) {
+        latents = descent.levenberg_marquardt(&latents, images, finish, &mut trace)?;
+    }
+    let last = network.losses(&latents, loss)?;
+    Ok(FitResult { latents, losses: trace.losses, last })
+}
+
+fn unsuited(loss: &ImageLoss<'_>) -> Error {
+    let why = match loss {
+        ImageLoss::Whole(_) => "the objective looks at whole images",
+        ImageLoss::Shaded(_) => "the light on a surface is seen mixed, not pixel by pixel",
+        ImageLoss::Pixels(_) => "this decoder cannot be folded",
+    };
+    Error::invalid(format!("the method levenberg-marquardt does not apply: {why}; use adam, or auto"))
+}
+
+/// scale · (−ln p) of a latent.
+struct Penalty<'a> {
+    prior: &'a Prior,
+    scale: f64,
+}
+
+impl Penalty<'_> {
+    /// Its value and slopes.
+    fn at(&self, vectors: &[[f32; 3]]) -> (f64, Vec<f64>) {
+        if self.scale == 0.0 {
+            return (0.0, vec![0.0; 3 * vectors.len()]);
+        }
+        let (energy, slopes) = self.prior.energy(vectors);
+        (self.scale * energy, slopes.as_flattened().iter().map(|s| self.scale * s).collect())
+    }
+
+    /// Its second derivatives, [3N, 3N]: the same everywhere, since it is a quadratic.
+    fn curvature(&self) -> Vec<f64> {
+        let n = self.prior.latent_vectors();
+        let mut vectors = vec![[0.0; 3]; n];
+        let (_, origin) = self.at(&vectors);
+        let mut rows = Vec::with_capacity(9 * n * n);
+        for k in 0..3 * n {
+            vectors.as_flattened_mut()[k] = 1.0;
+            rows.extend(self.at(&vectors).1.iter().zip(&origin).map(|(a, b)| a - b));
+            vectors.as_flattened_mut()[k] = 0.0;
+        }
+        rows
+    }
+
+    /// Added to the losses and slopes of all images.
+    fn add_to(&self, vectors: &[f32], found: &mut Evaluation) {
+        let count = 3 * self.prior.latent_vectors();
+        let each = vectors.chunks_exact(count).zip(&mut found.losses);
+        for ((z, loss), slopes) in each.zip(found.gradient.vectors.chunks_exact_mut(count)) {
+            let (value, by) = self.at(z.as_chunks().0);
+            *loss += value;
+            slopes.iter_mut().zip(by).for_each(|(slope, by)| *slope += by);
+        }
+    }
+}
+
+/// What is minimised.
+struct Descent<'a> {
+    network: &'a Network<'a>,
+    loss: &'a ImageLoss<'a>,
+    penalty: &'a Penalty<'a>,
+    config: &'a FitConfig,
+}
+
+/// The losses so far, and who is told of them.
+struct Trace<'a> {
+    losses: Vec<f64>,
+    watch: &'a mut dyn FnMut(u64, f64),
+}
+
+impl Trace<'_> {
+    /// The mean of the images' losses before an update.
+    fn add(&mut self, losses: &[f64]) -> Result<()> {
+        let value = losses.iter().sum::<f64>() / losses.len() as f64;
+        let step = self.losses.len() as u64;
+        if !value.is_finite() {
+            return Err(Error::invalid(format!(
+                "the fit's loss is {value} at step {step}; lower its learning rate, or start elsewhere"
+            )));
+        }
+        (self.watch)(step, value);
+        self.losses.push(value);
+        Ok(())
+    }
+}
+
+impl Descent<'_> {
+    fn adam(&self, start: &[Latent], steps: u64, trace: &mut Trace<'_>) -> Result<Vec<Latent>> {
+        let (n, config) = (self.penalty.prior.latent_vectors(), self.config);
+        let flat = start.iter().flat_map(|z| z.vectors.as_flattened()).copied();
+        let mut vectors = Variable::new(flat.collect(), config.epsilon);
+        let mut exposures = Variable::new(start.iter().map(|z| z.log_exposure).collect(), config.epsilon);
+        let latents = |vectors: &Variable, exposures: &Variable| -> Vec<Latent> {
+            let each = vectors.values.as_chunks().0.chunks_exact(n).map(<[[f32; 3]]>::to_vec);
+            let both = each.zip(&exposures.values);
+            both.map(|(v, log_exposure)| Latent { log_exposure: *log_exposure, ..Latent::new(v) }).collect()
+        };
+        let mut plateau = PlateauDetector::new(config.plateau, start.len());
+        for step in 0..steps {
+            let mut found = self.network.evaluate(&latents(&vectors, &exposures), self.loss)?;
+            self.penalty.add_to(&vectors.values, &mut found);
+            trace.add(&found.losses)?;
+            if plateau.ended(&found.losses) {
+                break;
+            }
+            let rate = config.learning_rate.at(step);
+            vectors.update(&found.gradient.vectors, rate, step + 1);
+            if config.free_exposure {
+                exposures.update(&found.gradient.exposures, rate, step + 1);
+            }
+        }
+        Ok(latents(&vectors, &exposures))
+    }
+
+    /// Every image is a search of its own; they go side by side.
+    fn levenberg_marquardt(
+        &self,
+        start: &[Latent],
+        images: &[PixelLoss<'_>],
+        steps: u64,
+        trace: &mut Trace<'_>,
+    ) -> Result<Vec<Latent>> {
+        let (curvature, free) = (self.penalty.curvature(), self.config.free_exposure);
+        let evaluate = |latent: &Latent, image: &PixelLoss<'_>| -> Result<Slopes> {
+            let found = self.network.equations(latent, image)?;
+            let (value, by) = self.penalty.at(&latent.vectors);
+            Ok(Slopes::new(found, free).plus(value, &by, &curvature))
+        };
+        let begin = |(latent, image): (&Latent, &PixelLoss<'_>)| -> Result<Search> {
+            Ok(Search::new(latent.clone(), evaluate(latent, image)?))
+        };
+        let mut searches = start.iter().zip(images).map(begin).collect::<Result<Vec<_>>>()?;
+        for _ in 0..steps {
+            trace.add(&searches.iter().map(Search::value).collect::<Vec<_>>())?;
+            if searches.iter().all(Search::ended) {
+                break;
+            }
+            for (search, image) in searches.iter_mut().zip(images).filter(|(search, _)| !search.ended()) {
+                search.step(|latent| evaluate(latent, image))?;
+            }
+        }
+        Ok(searches.into_iter().map(Search::into_latent).collect())
+    }
+}

@@ -1,0 +1,141 @@
+//! The method of Levenberg and Marquardt on one latent: Gauss–Newton steps, held back as far as their model of the loss
+//! proves wrong.
+//!
+//! A step δ solves (H + λ D) δ = −g with H and g of the [normal equations](veni_light::field::NormalEquations) and D the
+//! diagonal of H. It is taken if the loss falls; λ follows the ratio of the fall to the one that was promised, by
+//! the rule of Nielsen (1999, Damping Parameter in Marquardt's Method).
+
+use crate::Result;
+use veni_light::cholesky;
+use veni_light::field::{MAX_COORDINATE, NormalEquations};
+use veni_light::latent::Latent;
+
+/// λ at first.
+const DAMPING: f64 = 1e-2;
+/// Beyond this λ a step is too short to matter.
+const MOST_DAMPING: f64 = 1e8;
+/// Least diagonal element of D, in parts of the largest: coordinates that hardly matter stay where they are.
+const FLOOR: f64 = 1e-6;
+/// A fall of the loss by less than this fraction is no progress, and so many of them in a row end the search.
+const PROGRESS: f64 = 1e-4;
+const PATIENCE: u32 = 3;
+
+/// The loss at a latent, prior included, with what is needed for a step: over the coordinates that may move.
+#[derive(Debug)]
+pub(super) struct Slopes {
+    value: f64,
+    gradient: Vec<f64>,
+    matrix: Vec<f64>,
+}
+
+impl Slopes {
+    /// With the exposure as the last coordinate, if it is `free`.
+    pub(super) fn new(equations: NormalEquations, free: bool) -> Self {
+        let NormalEquations { loss: value, mut gradient, mut matrix } = equations;
+        if !free {
+            let n = gradient.len();
+            gradient.pop();
+            matrix = matrix.chunks_exact(n).take(n - 1).flat_map(|row| &row[..n - 1]).copied().collect();
+        }
+        Self { value, gradient, matrix }
+    }
+
+    /// With a penalty on the vectors' coordinates added.
+    pub(super) fn plus(mut self, value: f64, slopes: &[f64], curvature: &[f64]) -> Self {
+        let (n, m) = (self.gradient.len(), slopes.len());
+        self.value += value;
+        self.gradient.iter_mut().zip(slopes).for_each(|(g, by)| *g += by);
+        for (row, more) in self.matrix.chunks_exact_mut(n).zip(curvature.chunks_exact(m)) {
+            row.iter_mut().zip(more).for_each(|(h, more)| *h += more);
+        }
+        self
+    }
+
+    /// δ at damping λ, and the fall of the loss that it promises; nothing if the matrix is not positive definite.
+    fn step(&self, damping: f64) -> Option<(Vec<f64>, f64)> {
+        let n = self.gradient.len();
+        let largest = (0..n).map(|i| self.matrix[i * (n + 1)]).fold(0.0, f64::max);
+        let scale = |i: usize| self.matrix[i * (n + 1)].max(FLOOR * largest);
+        let mut factor = self.matrix.clone();
+        (0..n).for_each(|i| factor[i * (n + 1)] += damping * scale(i));
+        cholesky::factor(&mut factor, n)?;
+        let mut step: Vec<[f64; 1]> = self.gradient.iter().map(|g| [-g]).collect();
+        cholesky::substitute(&factor, n, &mut step);
+        let step = step.into_flattened();
+        // −gᵀδ − ½ δᵀHδ with H δ = −g − λ D δ
+        let terms = step.iter().zip(&self.gradient).enumerate();
+        let fall = terms.map(|(i, (d, g))| 0.5 * d * (damping * scale(i) * d - g)).sum();
+        Some((step, fall))
+    }
+}
+
+/// One latent on its way.
+#[derive(Debug)]
+pub(super) struct Search {
+    latent: Latent,
+    at: Slopes,
+    damping: f64,
+    growth: f64,
+    idle: u32,
+}
+
+impl Search {
+    pub(super) fn new(latent: Latent, at: Slopes) -> Self {
+        Self { latent, at, damping: DAMPING, growth: 2.0, idle: 0 }
+    }
+
+    /// The loss, prior included.
+    pub(super) fn value(&self) -> f64 {
+        self.at.value
+    }
+
+    /// Whether no further step is worth it.
+    pub(super) fn ended(&self) -> bool {
+        self.idle >= PATIENCE || self.damping > MOST_DAMPING
+    }
+
+    pub(super) fn into_latent(self) -> Latent {
+        self.latent
+    }
+
+    /// Tries a step, and takes it if the loss falls.
+    pub(super) fn step(&mut self, evaluate: impl FnOnce(&Latent) -> Result<Slopes>) -> Result<()> {
+        let trial = self.at.step(self.damping).map(|(step, fall)| (self.moved(&step), fall));
+        let Some((trial, fall)) = trial.filter(|(trial, _)| is_valid(trial)) else {
+            self.shorten();
+            return Ok(());
+        };
+        let found = evaluate(&trial)?;
+        let gain = self.at.value - found.value;
+        if gain.is_nan() || gain <= 0.0 {
+            self.shorten();
+            return Ok(());
+        }
+        self.idle = if gain < PROGRESS * self.at.value { self.idle + 1 } else { 0 };
+        let ratio = gain / fall;
+        self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
+        self.growth = 2.0;
+        (self.latent, self.at) = (trial, found);
+        Ok(())
+    }
+
+    fn shorten(&mut self) {
+        self.damping *= self.growth;
+        self.growth *= 2.0;
+    }
+
+    fn moved(&self, step: &[f64]) -> Latent {
+        let mut moved = self.latent.clone();
+        let exposure = step.get(3 * moved.vectors.len()).copied().unwrap_or(0.0);
+        moved.log_exposure = (f64::from(moved.log_exposure) + exposure) as f32;
+        for (value, step) in moved.vectors.as_flattened_mut().iter_mut().zip(step) {
+            *value = (f64::from(*value) + step) as f32;
+        }
+        moved
+    }
+}
+
+/// Whether a decoder takes it.
+fn is_valid(latent: &Latent) -> bool {
+    latent.check_finite().is_ok() && latent.vectors.as_flattened().iter().all(|c| c.abs() <= MAX_COORDINATE)
+}

@@ -1,0 +1,223 @@
+//! From a picture to what can be fitted: log radiance at exposure 0, what is known, what is clipped.
+
+use std::f32::consts::TAU;
+
+use super::FitTarget;
+use veni_image::LUMINANCE;
+use veni_image::Panorama;
+use veni_light::sphere::{Equirect, View};
+use crate::{Error, Result};
+
+/// A cell counts as unknown if less of it is known.
+const LEAST_KNOWN: f32 = 0.1;
+
+/// A picture of linear radiance, and what is known about its pixels. Row-major from the top left.
+#[derive(Clone, Debug)]
+pub struct Picture<'a> {
+    /// Width and height.
+    pub size: [usize; 2],
+    /// Linear radiance; a value that is not finite makes its pixel unknown.
+    pub pixels: &'a [[f32; 3]],
+    /// How much of each pixel is known, 0 to 1; absent: all of it.
+    pub known: Option<&'a [f32]>,
+    /// Values at or above this are clipped: the truth is at least that.
+    pub clip: Option<f32>,
+}
+
+/// One image, ready to be fitted.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    /// Width and height; the directions too, for a panorama.
+    pub grid: Equirect,
+    /// Directions and areas of the pixels of a perspective view.
+    pub view: Option<(Vec<[f32; 3]>, Vec<f32>)>,
+    /// Log radiance at exposure 0, 3·W·H values.
+    pub log_radiance: Vec<f32>,
+    /// What was subtracted: the mean of ln(luminance) over what is known, weighted by area.
+    pub log_exposure: f32,
+    /// How much of each pixel is known, if not all of all.
+    pub mask: Option<Vec<f32>>,
+    /// Which values are clipped, if any.
+    pub clipped: Option<Vec<bool>>,
+}
+
+impl Observation {
+    /// A panorama (width = 2 × height) brought to `grid`, by the mean radiance of what is known under each of its
+    /// pixels.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the lengths do not match or nothing positive is known.
+    pub fn panorama(picture: &Picture<'_>, grid: Equirect) -> Result<Self> {
+        picture.check()?;
+        let source = Equirect::new(picture.size[0], picture.size[1]);
+        if source.width != 2 * source.height {
+            return Err(Error::invalid(format!(
+                "{} × {} is no panorama: its width must be twice its height; say how a photograph was taken \
+                 (field of view and direction)",
+                source.width, source.height
+            )));
+        }
+        let (pixels, known) = picture.split();
+        let grey = |values: &[f32]| -> Vec<[f32; 3]> { values.iter().map(|v| [*v; 3]).collect() };
+        let sums = Panorama::new(source, pixels).resample(grid);
+        let known = Panorama::new(source, grey(&known)).resample(grid);
+        let clips = picture.clipped().map(|c| Panorama::new(source, c).resample(grid));
+        let areas: Vec<f32> = (0..grid.height)
+            .flat_map(|j| std::iter::repeat_n(grid.solid_angle(j) as f32, grid.width))
+            .collect();
+        let known = known.pixels().iter().map(|k| k[0]).collect();
+        Self::new(grid, None, &areas, sums.pixels(), known, clips.as_ref().map(Panorama::pixels))
+    }
+
+    /// A photograph taken by `view`, averaged over square cells so that neither side is longer than `longest`
+    /// pixels.
+    ///
+    /// # Errors
+    /// As [`Observation::panorama`]; also if `view` is none (a field of view of 0 or of half a turn).
+    pub fn photograph(picture: &Picture<'_>, view: &View, longest: usize) -> Result<Self> {
+        picture.check()?;
+        if !view.is_valid() {
+            let degrees = view.fov.to_degrees();
+            return Err(Error::invalid(format!(
+                "a field of view of {degrees}°: it must lie between 0 and 180, and all angles must be finite"
+            )));
+        }
+        let [width, height] = picture.size;
+        let cell = width.max(height).div_ceil(longest.max(1)).max(1);
+        // whole cells only, centred
+        let [w, h] = [(width / cell).max(1), (height / cell).max(1)];
+        let (pixels, known) = picture.split();
+        let clips = picture.clipped();
+        let [cw, ch] = [cell.min(width), cell.min(height)];
+        let [left, top] = [(width - w * cw) / 2, (height - h * ch) / 2];
+        let average = |at: &dyn Fn(usize) -> [f32; 3]| -> Vec<[f32; 3]> {
+            let mut out = Vec::with_capacity(w * h);
+            for (row, column) in (0..h).flat_map(|r| (0..w).map(move |c| (r, c))) {
+                let mut sum = [0.0f64; 3];
+                for (y, x) in (0..ch).flat_map(|y| (0..cw).map(move |x| (y, x))) {
+                    let value = at((top + row * ch + y) * width + left + column * cw + x);
+                    (0..3).for_each(|c| sum[c] += f64::from(value[c]));
+                }
+                out.push(sum.map(|v| (v / (cw * ch) as f64) as f32));
+            }
+            out
+        };
+        let sums = average(&|p| pixels[p]);
+        let known = average(&|p| [known[p]; 3]).into_iter().map(|k| k[0]).collect();
+        let clips = clips.map(|clips| average(&|p| clips[p]));
+        // what was cut off at the sides is not seen
+        let seen = 2.0 * ((0.5 * view.fov).tan() * (w * cw) as f64 / width as f64).atan();
+        let (directions, areas) = View { fov: seen, ..*view }.pixels(w, h);
+        let grid = Equirect::new(w, h);
+        Self::new(grid, Some((directions, areas.clone())), &areas, &sums, known, clips.as_deref())
+    }
+
+    /// `sums` are radiance × known.
+    fn new(
+        grid: Equirect,
+        view: Option<(Vec<[f32; 3]>, Vec<f32>)>,
+        areas: &[f32],
+        sums: &[[f32; 3]],
+        mut known: Vec<f32>,
+        clips: Option<&[[f32; 3]]>,
+    ) -> Result<Self> {
+        let mut radiance = Vec::with_capacity(3 * sums.len());
+        for (sum, known) in sums.iter().zip(&mut known) {
+            if *known < LEAST_KNOWN || sum.iter().all(|v| *v <= 0.0) {
+                *known = 0.0;
+            }
+            radiance.extend(sum.map(|v| if *known > 0.0 { v / *known } else { 1.0 }));
+        }
+        // a channel that is 0 has no logarithm: the darkest value that is known stands for it
+        let counted = radiance.iter().zip(known.iter().flat_map(|k| [*k; 3]));
+        let darkest = counted.filter(|(v, k)| *k > 0.0 && **v > 0.0).map(|(v, _)| *v).reduce(f32::min);
+        let darkest = darkest.ok_or_else(|| Error::invalid("nothing of the picture is known and above 0"))?;
+        let mut log_radiance: Vec<f32> = radiance.iter().map(|v| v.max(darkest).ln()).collect();
+        let (mut sum, mut total) = (0.0f64, 0.0f64);
+        for ((rgb, known), area) in radiance.chunks_exact(3).zip(&known).zip(areas) {
+            let luminance: f32 = rgb.iter().zip(LUMINANCE).map(|(v, w)| v.max(darkest) * w).sum();
+            let weight = f64::from(known * area);
+            sum += weight * f64::from(luminance).ln();
+            total += weight;
+        }
+        let log_exposure = (sum / total) as f32;
+        log_radiance.iter_mut().for_each(|v| *v -= log_exposure);
+        let clipped = clips.map(|clips| clips.as_flattened().iter().map(|c| *c > 0.0).collect::<Vec<_>>());
+        Ok(Self {
+            grid,
+            view,
+            log_radiance,
+            log_exposure,
+            mask: known.iter().any(|k| *k < 1.0 - 1e-5).then_some(known),
+            clipped: clipped.filter(|c| c.iter().any(|c| *c)),
+        })
+    }
+
+    /// Whether some of the sphere is not seen, so that the scene's own exposure is not known.
+    pub fn is_partial(&self) -> bool {
+        self.view.is_some() || self.mask.is_some()
+    }
+
+    /// The share of the sphere that is known.
+    pub fn share(&self) -> f32 {
+        let known = |p: usize| self.mask.as_ref().map_or(1.0, |m| m[p]);
+        let area = |p: usize| match &self.view {
+            Some((_, areas)) => areas[p],
+            None => self.grid.solid_angle(p / self.grid.width) as f32,
+        };
+        (0..self.grid.len()).map(|p| known(p) * area(p)).sum::<f32>() / (2.0 * TAU)
+    }
+
+    /// Hands the target of a fit to `use_target`.
+    pub fn with_target<T>(&self, use_target: impl FnOnce(&FitTarget<'_>) -> T) -> T {
+        let images = [self.log_radiance.as_slice()];
+        let masks = self.mask.as_ref().map(|m| [m.as_slice()]);
+        let clipped = self.clipped.as_ref().map(|c| [c.as_slice()]);
+        let view = self.view.as_ref();
+        use_target(&FitTarget {
+            directions: view.map(|(d, _)| d.as_slice()),
+            areas: view.map(|(_, a)| a.as_slice()),
+            masks: masks.as_ref().map(|m| m.as_slice()),
+            clipped: clipped.as_ref().map(|c| c.as_slice()),
+            ..FitTarget::panoramas(self.grid, &images)
+        })
+    }
+}
+
+impl Picture<'_> {
+    fn check(&self) -> Result<()> {
+        let [width, height] = self.size;
+        let count = width * height;
+        if count == 0 || self.pixels.len() != count || self.known.is_some_and(|k| k.len() != count) {
+            return Err(Error::invalid(format!(
+                "a picture of {width} × {height} has {} pixels and a mask of {}",
+                self.pixels.len(),
+                self.known.map_or(count, <[_]>::len)
+            )));
+        }
+        Ok(())
+    }
+
+    /// Radiance × known, and known; both 0 where a value is no number.
+    fn split(&self) -> (Vec<[f32; 3]>, Vec<f32>) {
+        let known = |p: usize| {
+            let finite = self.pixels[p].iter().all(|v| v.is_finite());
+            // NaN in a mask is unknown too
+            if finite { self.known.map_or(1.0, |k| k[p].clamp(0.0, 1.0).max(0.0)) } else { 0.0 }
+        };
+        let known: Vec<f32> = (0..self.pixels.len()).map(known).collect();
+        let weighted = |(rgb, k): (&[f32; 3], &f32)| {
+            if *k > 0.0 { rgb.map(|v| v.max(0.0) * k) } else { [0.0; 3] }
+        };
+        (self.pixels.iter().zip(&known).map(weighted).collect(), known)
+    }
+
+    /// 1 for every clipped value.
+    fn clipped(&self) -> Option<Vec<[f32; 3]>> {
+        let clip = self.clip?;
+        Some(self.pixels.iter().map(|rgb| rgb.map(|v| if v >= clip { 1.0 } else { 0.0 })).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,148 @@
+//! Losses that look at each pixel alone, with their derivatives, in f64.
+
+use super::config::Objective;
+use super::target::FitTarget;
+use veni_image::{luminance, tonemap};
+
+/// Where the absolute error turns from a parabola into a line, in log radiance.
+const ROUNDING: f64 = 0.1;
+
+/// Where the part of [`Objective::Energy`] that goes by light turns from a parabola into a line, in log radiance.
+const REACH: f64 = 1.0;
+
+/// A pixel's part of a loss around a prediction, channel by channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct PixelValue {
+    pub(super) loss: f64,
+    pub(super) slope: [f64; 3],
+    /// Of the parabola that stands for the loss where a squared error would be one: at least 0.
+    pub(super) curvature: [f64; 3],
+}
+
+/// One image's loss: a sum over pixels.
+#[derive(Debug)]
+pub(super) struct PixelLoss<'a> {
+    objective: Objective,
+    image: &'a [f32],
+    clipped: Option<&'a [bool]>,
+    /// Per pixel; 0 where nothing is known.
+    weights: Vec<f64>,
+    /// Per pixel, what the light that comes from there adds to its weight; if that counts.
+    light: Vec<f64>,
+    /// Log of the white point.
+    white: f64,
+    /// The image as shown, if that is compared.
+    shown: Vec<f64>,
+}
+
+impl<'a> PixelLoss<'a> {
+    /// Of each image, under an objective that [looks at each pixel alone](Objective::is_pixelwise).
+    pub(super) fn of_images(objective: Objective, target: &FitTarget<'a>) -> Vec<Self> {
+        let areas = target.areas();
+        (0..target.images.len()).map(|b| Self::new(objective, target, b, &areas)).collect()
+    }
+
+    /// For image `b`.
+    pub(super) fn new(objective: Objective, target: &FitTarget<'a>, b: usize, areas: &[f64]) -> Self {
+        let image = target.images[b];
+        let mask = target.masks.map(|masks| masks[b]);
+        let pixels = areas.len() as f64;
+        let counts = |p: usize| mask.map_or(1.0, |m| f64::from(m[p]));
+        let weights: Vec<f64> = match objective {
+            Objective::ReferenceLogError => (0..areas.len()).map(|p| counts(p).powi(2) / pixels).collect(),
+            _ => {
+                let total: f64 = areas.iter().enumerate().map(|(p, area)| area * counts(p)).sum();
+                areas.iter().enumerate().map(|(p, area)| area * counts(p) / total).collect()
+            }
+        };
+        let (weights, light) = match objective {
+            Objective::Energy { share } => by_light(image, weights, share),
+            _ => (weights, Vec::new()),
+        };
+        let (white, shown) = match objective {
+            Objective::Display { .. } => {
+                let white = white(image, &weights);
+                (white, image.iter().map(|i| display(f64::from(*i) - white).0).collect())
+            }
+            _ => (0.0, Vec::new()),
+        };
+        Self { objective, image, clipped: target.clipped.map(|c| c[b]), weights, light, white, shown }
+    }
+
+    /// The pixel's part of the loss for log radiance `prediction`.
+    pub(super) fn at(&self, pixel: usize, prediction: [f64; 3]) -> PixelValue {
+        let area = self.weights[pixel];
+        let weight = area + self.light.get(pixel).copied().unwrap_or(0.0);
+        let mut out = PixelValue::default();
+        if weight == 0.0 {
+            return out;
+        }
+        for (c, p) in prediction.into_iter().enumerate() {
+            let k = 3 * pixel + c;
+            let i = f64::from(self.image[k]);
+            let error = p - i;
+            if error > 0.0 && self.clipped.is_some_and(|clipped| clipped[k]) {
+                continue;
+            }
+            let (value, slope, curvature) = match self.objective {
+                Objective::LogAbsolute => {
+                    // the parabola through the same value and slope that lies above it everywhere
+                    let root = error.hypot(ROUNDING);
+                    (root - ROUNDING, error / root, 1.0 / root)
+                }
+                Objective::Display { log } => {
+                    let (shown, by) = display(p - self.white);
+                    let difference = shown - self.shown[k];
+                    let slope = 2.0 * difference * by + 2.0 * log * error;
+                    (difference * difference + log * error * error, slope, 2.0 * by * by + 2.0 * log)
+                }
+                Objective::Energy { .. } => {
+                    // e² where it is small, a line where it is not: see `Objective::Energy`
+                    let (root, light) = ((error / REACH).hypot(1.0), self.light[pixel]);
+                    let value = area * error * error + light * 2.0 * REACH * REACH * (root - 1.0);
+                    let by = area + light / root;
+                    (value / weight, 2.0 * error * by / weight, 2.0 * by / weight)
+                }
+                _ => (error * error, 2.0 * error, 2.0),
+            };
+            // the mean over the channels
+            out.loss += weight / 3.0 * value;
+            out.slope[c] = weight / 3.0 * slope;
+            out.curvature[c] = weight / 3.0 * curvature;
+        }
+        out
+    }
+}
+
+/// What is left of the weights, and `share` of their sum dealt out by the light that comes from each pixel.
+fn by_light(image: &[f32], weights: Vec<f64>, share: f64) -> (Vec<f64>, Vec<f64>) {
+    let luminance = |rgb: &[f32]| f64::from(luminance([0, 1, 2].map(|c| rgb[c].exp())));
+    // what is unknown may be anything
+    let light =
+        image.chunks_exact(3).zip(&weights).map(|(rgb, w)| if *w > 0.0 { w * luminance(rgb) } else { 0.0 });
+    let light: Vec<f64> = light.collect();
+    let (sum, total) = (weights.iter().sum::<f64>(), light.iter().sum::<f64>());
+    let scale = if total > 0.0 { share * sum / total } else { 0.0 };
+    let rest = weights.into_iter().map(|w| (1.0 - share) * w).collect();
+    (rest, light.into_iter().map(|light| scale * light).collect())
+}
+
+/// The log of the 98 % quantile of an image's known values.
+fn white(image: &[f32], weights: &[f64]) -> f64 {
+    let known = image.chunks_exact(3).zip(weights).filter(|(_, w)| **w > 0.0);
+    let radiance: Vec<f32> = known.flat_map(|(rgb, _)| rgb.iter().map(|v| v.exp())).collect();
+    f64::from(tonemap::quantile(&radiance, 0.98)).ln()
+}
+
+/// The sRGB curve of min(eˣ, 1), and its derivative by x.
+fn display(x: f64) -> (f64, f64) {
+    if x >= 0.0 {
+        return (1.0, 0.0);
+    }
+    let linear = x.exp();
+    if linear < 0.003_130_8 {
+        return (12.92 * linear, 12.92 * linear);
+    }
+    let curved = 1.055 * linear.powf(1.0 / 2.4);
+    (curved - 0.055, curved / 2.4)
+}

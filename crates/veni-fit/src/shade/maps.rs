@@ -1,0 +1,222 @@
+//! Surfaces from image files: normal maps, masks, albedo.
+
+use std::path::Path;
+
+use super::vector::{length, narrow, unit_f32, wide};
+use veni_image::tonemap::srgb_to_linear;
+use veni_image::{Panorama, ReadOptions};
+use crate::{Error, Result};
+
+/// A normal counts if its length lies strictly between these (REFERENCE §11).
+const LENGTHS: [f64; 2] = [0.5, 1.5];
+
+/// An image of normals, row-major, row 0 on top; (0, 0, 0) where nothing is seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalMap {
+    width: usize,
+    height: usize,
+    normals: Vec<[f32; 3]>,
+}
+
+impl NormalMap {
+    /// From vectors of any length.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if there are not W·H of them.
+    pub fn new([width, height]: [usize; 2], normals: Vec<[f32; 3]>) -> Result<Self> {
+        if normals.len() != width * height {
+            return Err(Error::invalid(format!("{} normals for {width} × {height} pixels", normals.len())));
+        }
+        Ok(Self { width, height, normals })
+    }
+
+    /// Reads an EXR or Radiance file, whose R, G, B are x, y, z as they stand, or a PNG, which holds 127.5 (n + 1)
+    /// per byte (32767.5 (n + 1) in 16 bits); black and transparent pixels of a PNG show nothing.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is no such image.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let (size, normals) = if is_png(path)? {
+            let (size, pixels) = png(path)?;
+            let decode = |[r, g, b, a]: [f32; 4]| {
+                let seen = a >= 0.5 && [r, g, b] != [0.0; 3];
+                if seen { [r, g, b].map(|v| 2.0 * v - 1.0) } else { [0.0; 3] }
+            };
+            (size, pixels.into_iter().map(decode).collect())
+        } else {
+            linear(path)?
+        };
+        Self::new(size, normals).map_err(|e| e.in_file(path))
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// The vectors as they are.
+    pub fn normals(&self) -> &[[f32; 3]] {
+        &self.normals
+    }
+
+    /// The unit vector if the length is between 0.5 and 1.5, else `None`.
+    pub fn valid(normal: [f32; 3]) -> Option<[f32; 3]> {
+        let length = length(wide(normal));
+        (length > LENGTHS[0] && length < LENGTHS[1]).then(|| unit_f32(normal)).flatten()
+    }
+
+    /// Each vector (x, y, z) becomes (x, −y, z): from maps whose green channel grows downwards (as the authors' program
+    /// does with all of its maps).
+    #[must_use]
+    pub fn flip_y(mut self) -> Self {
+        self.normals.iter_mut().for_each(|n| n[1] = -n[1]);
+        self
+    }
+
+    /// Another size, bilinearly between pixel centres, without averaging where the map shrinks: what the authors do.
+    /// Normals of an edge become too short to be [valid](Self::valid).
+    #[must_use]
+    pub fn resize(&self, width: usize, height: usize) -> Self {
+        let columns = taps(self.width, width);
+        let mut normals = Vec::with_capacity(width * height);
+        for [(j0, wj0), (j1, wj1)] in taps(self.height, height) {
+            for [(i0, wi0), (i1, wi1)] in &columns {
+                let mut sum = [0.0; 3];
+                for (j, wj) in [(j0, wj0), (j1, wj1)] {
+                    for (i, wi) in [(i0, wi0), (i1, wi1)] {
+                        let normal = wide(self.normals[j * self.width + i]);
+                        (0..3).for_each(|c| sum[c] += wj * wi * normal[c]);
+                    }
+                }
+                normals.push(narrow(sum));
+            }
+        }
+        Self { width, height, normals }
+    }
+}
+
+/// The two source pixels of each target pixel; the edge pixel is repeated outside.
+fn taps(source: usize, target: usize) -> Vec<[(usize, f64); 2]> {
+    let step = source as f64 / target as f64;
+    (0..target)
+        .map(|k| {
+            let at = ((k as f64 + 0.5) * step - 0.5).clamp(0.0, (source - 1) as f64);
+            let (low, part) = (at.floor() as usize, at.fract());
+            [(low, 1.0 - part), ((low + 1).min(source - 1), part)]
+        })
+        .collect()
+}
+
+/// Reads a mask: a pixel belongs to the surface where its luminance (times alpha) is at least one half. PNG, EXR or
+/// Radiance. Returns [W, H] and the values, row-major.
+///
+/// # Errors
+/// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is no such image.
+pub fn read_mask(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<bool>)> {
+    let path = path.as_ref();
+    if is_png(path)? {
+        let (size, pixels) = png(path)?;
+        let inside = |[r, g, b, a]: [f32; 4]| veni_image::luminance([r, g, b]) * a >= 0.5;
+        return Ok((size, pixels.into_iter().map(inside).collect()));
+    }
+    let (size, pixels) = linear(path)?;
+    Ok((size, pixels.into_iter().map(|p| veni_image::luminance(p) >= 0.5).collect()))
+}
+
+/// Reads an albedo map as linear reflectance: EXR and Radiance as they stand, PNG through the sRGB curve. Returns [W, H]
+/// and the colours, row-major.
+///
+/// # Errors
+/// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is no such image.
+pub fn read_albedo(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<[f32; 3]>)> {
+    let path = path.as_ref();
+    if is_png(path)? {
+        let (size, pixels) = png(path)?;
+        return Ok((size, pixels.into_iter().map(|[r, g, b, _]| [r, g, b].map(srgb_to_linear)).collect()));
+    }
+    linear(path)
+}
+
+fn linear(path: &Path) -> Result<([usize; 2], Vec<[f32; 3]>)> {
+    let image = Panorama::read_with(path, &ReadOptions { any_aspect: true, ..ReadOptions::default() })?;
+    let grid = image.grid();
+    Ok(([grid.width, grid.height], image.into_pixels()))
+}
+
+fn is_png(path: &Path) -> Result<bool> {
+    use std::io::Read;
+    let file = std::fs::File::open(path).map_err(|e| Error::io(path, "open", e))?;
+    let mut start = Vec::new();
+    file.take(8).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
+    Ok(start == b"\x89PNG\r\n\x1a\n")
+}
+
+/// Values 0 to 1, not linearised: red, green, blue, alpha.
+fn png(path: &Path) -> Result<([usize; 2], Vec<[f32; 4]>)> {
+    let reader = image::ImageReader::open(path).map_err(|e| Error::io(path, "open", e))?;
+    let mut reader = reader.with_guessed_format().map_err(|e| Error::io(path, "read", e))?;
+    reader.limits(image::Limits::default());
+    let decoded = reader.decode().map_err(|e| Error::invalid(format!("{}: {e}", path.display())))?;
+    let rgba = decoded.to_rgba32f();
+    let size = [rgba.width() as usize, rgba.height() as usize];
+    Ok((size, rgba.into_raw().as_chunks::<4>().0.to_vec()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use veni_light::output::Overwrite;
+    use veni_image::{Precision, WriteFormat, WriteOptions};
+    use veni_light::sphere::Equirect;
+
+    #[test]
+    fn lengths_decide_what_is_a_normal() {
+        assert_eq!(NormalMap::valid([0.0, 0.0, 1.4]), Some([0.0, 0.0, 1.0]));
+        for wrong in [[0.0, 0.5, 0.0], [0.0, 0.0, 1.5], [0.0; 3], [f32::NAN, 0.0, 1.0], [f32::INFINITY; 3]] {
+            assert_eq!(NormalMap::valid(wrong), None, "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn resizing_interpolates_between_centres() {
+        let map = NormalMap::new([2, 1], vec![[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]).unwrap();
+        let wide = map.resize(4, 1);
+        let expected = [[0.0, 0.0, 1.0], [0.25, 0.0, 0.75], [0.75, 0.0, 0.25], [1.0, 0.0, 0.0]];
+        assert_eq!(wide.normals(), expected);
+        assert_eq!(map.resize(1, 1).normals(), [[0.5, 0.0, 0.5]]);
+        assert_eq!(map.resize(2, 1), map);
+        let edge = NormalMap::new([2, 1], vec![[0.0; 3], [0.0, 1.0, 0.0]]).unwrap().resize(4, 1);
+        let seen: Vec<_> = edge.normals().iter().map(|n| NormalMap::valid(*n).is_some()).collect();
+        assert_eq!(seen, [false, false, true, true]);
+        assert_eq!(edge.flip_y().normals()[3], [0.0, -1.0, 0.0]);
+        assert!(NormalMap::new([2, 2], vec![[0.0; 3]]).is_err());
+    }
+
+    #[test]
+    fn files_come_back_as_what_they_were() {
+        let folder = tempfile::tempdir().unwrap();
+        let (exr, png) = (folder.path().join("n.exr"), folder.path().join("n.png"));
+        let normals =
+            vec![[0.0, 0.0, -1.0], [0.6, -0.8, 0.0], [0.0; 3], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]];
+        let options = WriteOptions {
+            latlong: false,
+            overwrite: Overwrite::Refuse,
+            ..WriteOptions::new(WriteFormat::Exr(Precision::Float))
+        };
+        Panorama::new(Equirect::new(3, 2), normals.clone()).write(&exr, &options).unwrap();
+        assert_eq!(NormalMap::read(&exr).unwrap(), NormalMap::new([3, 2], normals).unwrap());
+        let pixels = image::RgbaImage::from_raw(2, 1, vec![128, 128, 255, 255, 9, 9, 9, 0]).unwrap();
+        pixels.save(&png).unwrap();
+        let map = NormalMap::read(&png).unwrap();
+        assert!((map.normals()[0][2] - 1.0).abs() < 1e-6 && map.normals()[0][0].abs() < 5e-3);
+        assert_eq!(map.normals()[1], [0.0; 3]);
+        assert_eq!(read_mask(&png).unwrap(), ([2, 1], vec![true, false]));
+        assert!((read_albedo(&png).unwrap().1[0][0] - 0.2158605).abs() < 1e-5);
+        let text = folder.path().join("n.txt");
+        std::fs::write(&text, "no image").unwrap();
+        for error in [NormalMap::read(&text).err(), read_mask(&text).err(), read_albedo(&text).err()] {
+            assert!(error.unwrap().to_string().contains("n.txt"));
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Several starts for one image: the best of them, and how much they disagree.
+
+use super::{FitConfig, FitResult, FitTarget, LatentDecoder, fit_shaded, fit_with};
+use crate::Result;
+use veni_light::random::{Purpose, stream};
+use veni_light::latent::{Latent, Prior};
+use crate::shade::ShadedImage;
+
+/// The best of several fits of one image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Best {
+    /// The latent with the lowest loss.
+    pub latent: Latent,
+    /// Its loss.
+    pub loss: f64,
+    /// The latents of all starts, in their order.
+    pub all: Vec<Latent>,
+    /// Their losses.
+    pub losses: Vec<f64>,
+}
+
+/// `count` latents drawn from `prior`, at `log_exposure`. The same seed gives the same starts.
+pub fn random_starts(prior: &Prior, log_exposure: f32, count: usize, seed: u64) -> Vec<Latent> {
+    let draw = |k: usize| {
+        let mut rng = stream(seed, Purpose::Fit, k as u64, 0);
+        Latent { log_exposure, ..Latent::new(Latent::sample(prior, &mut rng).vectors) }
+    };
+    (0..count).map(draw).collect()
+}
+
+/// Fits the single image of `target` from every start, and keeps the best. `watch` gets the number of updates
+/// made, all starts together, and the loss.
+///
+/// # Errors
+/// As [`fit`](super::fit).
+///
+/// # Panics
+/// If there is no start, or not exactly one image.
+pub fn best_of(
+    decoder: &dyn LatentDecoder,
+    target: &FitTarget<'_>,
+    starts: &[Latent],
+    config: &FitConfig,
+    watch: &mut dyn FnMut(u64, f64),
+) -> Result<Best> {
+    assert!(target.images.len() == 1, "one image");
+    from_each(starts, config, watch, |start, watch| fit_with(decoder, target, start, config, None, watch))
+}
+
+/// [`best_of`] for the light on a surface: [`fit_shaded`] of one image from every start.
+///
+/// # Errors
+/// As [`fit_shaded`].
+///
+/// # Panics
+/// If there is no start.
+pub fn best_light(
+    decoder: &dyn LatentDecoder,
+    image: &ShadedImage,
+    prior: Option<&Prior>,
+    starts: &[Latent],
+    config: &FitConfig,
+    watch: &mut dyn FnMut(u64, f64),
+) -> Result<Best> {
+    let image = std::slice::from_ref(image);
+    from_each(starts, config, watch, |start, watch| fit_shaded(decoder, image, prior, start, config, watch))
+}
+
+/// The best of the fits that `fit` makes from each start; it is told the starts one by one, and an observer as [`fit_with`]'s.
+///
+/// # Errors
+/// Those of `fit`.
+///
+/// # Panics
+/// If there is no start.
+pub fn from_each(
+    starts: &[Latent],
+    config: &FitConfig,
+    watch: &mut dyn FnMut(u64, f64),
+    mut fit: impl FnMut(&[Latent], &mut dyn FnMut(u64, f64)) -> Result<FitResult>,
+) -> Result<Best> {
+    let (mut all, mut losses) = (Vec::new(), Vec::new());
+    for (k, start) in starts.iter().enumerate() {
+        let before = k as u64 * config.most_updates(start.vectors.len());
+        let found = fit(std::slice::from_ref(start), &mut |step, loss| watch(before + step, loss))?;
+        all.extend(found.latents);
+        losses.extend(found.last);
+    }
+    Ok(Best::of(all, losses))
+}
+
+impl Best {
+    /// The best of these.
+    ///
+    /// # Panics
+    /// If there is none, or not one loss for each.
+    fn of(all: Vec<Latent>, losses: Vec<f64>) -> Self {
+        assert!(!all.is_empty() && all.len() == losses.len(), "a loss for each of at least one latent");
+        let best = (0..all.len()).min_by(|a, b| losses[*a].total_cmp(&losses[*b])).unwrap_or(0);
+        Self { latent: all[best].clone(), loss: losses[best], all, losses }
+    }
+}

@@ -1,0 +1,117 @@
+//! What other software writes.
+
+use exr::meta::attribute::EnvironmentMap;
+use exr::prelude::*;
+
+use super::super::*;
+use super::{assert_close, exr_file, folder, plane, rgb, sky};
+use crate::Error;
+use veni_light::sphere::Equirect;
+
+#[test]
+fn every_compression_tiles_and_line_orders() {
+    let dir = folder();
+    let image = sky(80, 40);
+    let path = dir.path().join("c.exr");
+    let tiles = Blocks::Tiles(Vec2(32, 24));
+    for compression in [
+        Compression::Uncompressed,
+        Compression::RLE,
+        Compression::ZIP1,
+        Compression::ZIP16,
+        Compression::PIZ,
+        Compression::PXR24,
+        Compression::B44,
+        Compression::B44A,
+    ] {
+        for (blocks, line_order) in [
+            (Blocks::ScanLines, LineOrder::Increasing),
+            (Blocks::ScanLines, LineOrder::Decreasing),
+            (tiles, LineOrder::Increasing),
+            (tiles, LineOrder::Unspecified),
+        ] {
+            exr_file(&path, (80, 40), rgb(&image), Encoding { compression, blocks, line_order }, |_, _| ());
+            // PXR24 keeps 16 bits of a float's significand; the others are lossless for floats
+            let tolerance = if compression == Compression::PXR24 { 2e-5 } else { 0.0 };
+            assert_close(&image, &Panorama::read(&path).unwrap(), tolerance);
+        }
+    }
+}
+
+#[test]
+fn windows_channels_layers_and_primaries_of_other_software() {
+    let dir = folder();
+    let path = dir.path().join("x.exr");
+    let image = sky(16, 8);
+    let plain = Encoding::FAST_LOSSLESS;
+    // a display window elsewhere, equal to the data window
+    exr_file(&path, (16, 8), rgb(&image), plain, |shared, own| {
+        own.layer_position = Vec2(10, -20);
+        shared.display_window.position = Vec2(10, -20);
+    });
+    assert_eq!(Panorama::read(&path).unwrap().pixels(), image.pixels());
+    // a data window inside a larger display window: black around it
+    exr_file(&path, (16, 8), rgb(&image), plain, |shared, own| {
+        own.layer_position = Vec2(3, 2);
+        shared.display_window = IntegerBounds::from_dimensions(Vec2(24, 12));
+    });
+    let padded = Panorama::read(&path).unwrap();
+    assert_eq!(padded.grid(), Equirect::new(24, 12));
+    assert_eq!((padded.pixel(3, 2), padded.pixel(18, 9)), (image.pixel(0, 0), image.pixel(15, 7)));
+    assert_eq!((padded.pixel(2, 2), padded.pixel(19, 9)), ([0.0; 3], [0.0; 3]));
+    // overscan: a data window larger than the display window is cut, in tiles too
+    exr_file(&path, (16, 8), rgb(&image), plain, |shared, own| {
+        own.layer_position = Vec2(-4, -2);
+        shared.display_window = IntegerBounds::from_dimensions(Vec2(8, 4));
+    });
+    let cut = Panorama::read(&path).unwrap();
+    assert_eq!((cut.pixel(0, 0), cut.pixel(7, 3)), (image.pixel(4, 2), image.pixel(11, 5)));
+    // mixed sample types and an alpha that is ignored
+    let uint = plane(&image, 2).iter().map(|v| v.round() as u32).collect::<Vec<_>>();
+    let half = plane(&image, 0).iter().map(|&v| f16::from_f32(v)).collect::<Vec<_>>();
+    let channels = vec![
+        ("A", FlatSamples::F16(vec![f16::ZERO; 128])),
+        ("R", FlatSamples::F16(half)),
+        ("G", FlatSamples::F32(plane(&image, 1))),
+        ("B", FlatSamples::U32(uint)),
+    ];
+    exr_file(&path, (16, 8), channels, plain, |_, _| ());
+    let [r, g, b] = Panorama::read(&path).unwrap().pixel(9, 4);
+    let [x, y, z] = image.pixel(9, 4);
+    assert!((r - x).abs() < 5e-4 * x && g == y && b == z.round());
+    // luminance alone
+    exr_file(&path, (16, 8), vec![("Y", FlatSamples::F32(plane(&image, 1)))], plain, |_, _| ());
+    assert_eq!(Panorama::read(&path).unwrap().pixel(5, 5), [image.pixel(5, 5)[1]; 3]);
+    // no colour at all
+    exr_file(&path, (16, 8), vec![("Z", FlatSamples::F32(plane(&image, 1)))], plain, |_, _| ());
+    assert!(Panorama::read(&path).unwrap_err().to_string().contains("among: Z"));
+    // a named main layer beside another; and two that nothing tells apart
+    let named = |a: &'static str, b: &'static str| {
+        let mut channels = Vec::new();
+        for (layer, offset) in [(a, 0.0), (b, 1000.0)] {
+            for (i, name) in ["R", "G", "B"].into_iter().enumerate() {
+                let samples = plane(&image, i).iter().map(|v| v + offset).collect();
+                channels.push((format!("{layer}.{name}"), FlatSamples::F32(samples)));
+            }
+        }
+        let channels: Vec<_> = channels.iter().map(|(n, s)| (n.as_str(), s.clone())).collect();
+        exr_file(&path, (16, 8), channels, plain, |_, _| ());
+    };
+    named("View.Combined", "View.Diffuse");
+    assert_eq!(Panorama::read(&path).unwrap().pixels(), image.pixels());
+    named("left", "right");
+    assert!(Panorama::read(&path).unwrap_err().to_string().contains("\"left\", \"right\""));
+    let pick = ReadOptions { layer: Some("left".into()), ..ReadOptions::default() };
+    assert_eq!(Panorama::read_with(&path, &pick).unwrap().pixels(), image.pixels());
+    // other primaries are converted, white stays white
+    let grey = Panorama::new(image.grid(), vec![[0.5; 3]; 128]);
+    exr_file(&path, (16, 8), rgb(&grey), plain, |shared, _| {
+        let xy = [Vec2(0.713, 0.293), Vec2(0.165, 0.830), Vec2(0.128, 0.044), Vec2(0.321_68, 0.337_67)];
+        let [red, green, blue, white] = xy;
+        shared.chromaticities = Some(attribute::Chromaticities { red, green, blue, white });
+    });
+    assert_close(&grey, &Panorama::read(&path).unwrap(), 1e-5);
+    // a cube map is no panorama
+    exr_file(&path, (16, 8), rgb(&image), plain, |_, own| own.environment_map = Some(EnvironmentMap::Cube));
+    assert!(matches!(Panorama::read(&path), Err(Error::Unsupported(m)) if m.contains("cube")));
+}

@@ -1,0 +1,214 @@
+//! Reading: which format a file is, and the limits that its header must meet before pixels are allocated.
+
+#[cfg(feature = "avif")]
+mod avif;
+mod exr;
+mod hdr;
+mod ldr;
+#[cfg(test)]
+mod ldr_tests;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::Path;
+
+use image::ImageFormat;
+
+use super::Panorama;
+use veni_light::sphere::Equirect;
+use crate::{Error, Result};
+
+pub use ldr::{LdrPanorama, Transfer};
+
+/// The largest panorama that [`Panorama::read`] accepts: 2²⁸ pixels (a little over 23,000 × 11,500), which is
+/// 3 GiB of radiance. [`ReadOptions::max_pixels`] overrides it.
+pub const DEFAULT_MAX_PIXELS: usize = 1 << 28;
+
+/// What [`Panorama::read_with`] accepts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Largest number of pixels; a header that claims more is refused before anything is allocated.
+    pub max_pixels: usize,
+    /// Accept a width that is not twice the height.
+    pub any_aspect: bool,
+    /// Which EXR layer to read, for files with several ("ViewLayer.Combined" for channels "ViewLayer.Combined.R" …).
+    pub layer: Option<String>,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self { max_pixels: DEFAULT_MAX_PIXELS, any_aspect: false, layer: None }
+    }
+}
+
+impl ReadOptions {
+    /// Checks a size from a header.
+    fn check(&self, width: usize, height: usize) -> Result<Equirect> {
+        if width == 0 || height == 0 {
+            return Err(Error::invalid(format!("the header says {width} × {height}: there are no pixels")));
+        }
+        if width.checked_mul(height).is_none_or(|n| n > self.max_pixels) {
+            return Err(Error::invalid(format!(
+                "the header claims {width} × {height} pixels, more than the limit of {}",
+                self.max_pixels
+            )));
+        }
+        if width != 2 * height && !self.any_aspect {
+            return Err(Error::invalid(format!(
+                "{width} × {height} is no equirectangular panorama: its width must be twice its height"
+            )));
+        }
+        Ok(Equirect::new(width, height))
+    }
+}
+
+impl Panorama {
+    /// Reads an OpenEXR or Radiance `.hdr` panorama of at most [`DEFAULT_MAX_PIXELS`]; the content decides the
+    /// format, not the name. See [`Panorama::read_with`].
+    ///
+    /// # Errors
+    /// As [`Panorama::read_with`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        Self::read_with(path, &ReadOptions::default())
+    }
+
+    /// Reads an OpenEXR or Radiance `.hdr` panorama. Values are as stored (possibly not finite:
+    /// [`Panorama::sanitise`]), brought to Rec. 709 primaries where the file names others.
+    ///
+    /// - OpenEXR: every compression and sample type of the `exr` crate, scan lines or tiles, the largest level
+    ///   of multi-resolution files. The panorama is the display window; where the data window leaves some of it
+    ///   uncovered the pixels are black, as OpenEXR defines, and what lies outside is cut off. Colour channels
+    ///   are R, G, B or, failing that, Y alone as grey; alpha is ignored. A factor that [`HalfRange::Fit`]
+    ///   recorded in the file is divided out again.
+    /// - Radiance: values are divided by the product of the EXPOSURE lines, as that format asks.
+    ///
+    /// [`HalfRange::Fit`]: super::HalfRange::Fit
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for formats with a limited range (PNG, JPEG, …), cube maps, deep, subsampled or
+    /// XYZ-coded images; [`Error::Invalid`] for damaged files and for sizes that `options` refuse;
+    /// [`Error::Io`] if the file cannot be read.
+    pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
+        let path = path.as_ref();
+        let read = || -> Result<Self> {
+            let mut file = open(path)?;
+            match kind(&mut file, path)? {
+                Kind::Exr => exr::read(file, path, options),
+                Kind::Hdr { strict } => hdr::read(file, path, strict, options),
+            }
+        };
+        read().map_err(|e| e.in_file(path))
+    }
+
+    /// The alpha channel of the pixels that [`Panorama::read_with`] gives, row-major, 0 where an EXR file's data
+    /// window leaves the panorama uncovered; nothing for files without one, Radiance files among them.
+    ///
+    /// # Errors
+    /// As [`Panorama::read_with`].
+    pub fn read_alpha(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Option<Vec<f32>>> {
+        let path = path.as_ref();
+        let read = || {
+            let mut file = open(path)?;
+            match kind(&mut file, path)? {
+                Kind::Exr => exr::read_alpha(file, path, options),
+                Kind::Hdr { .. } => Ok(None),
+            }
+        };
+        read().map_err(|e| e.in_file(path))
+    }
+}
+
+/// The text attributes of an EXR file, from its header alone (no pixel is read); those of the first part where
+/// parts disagree. A Radiance file gives its `NAME=value` header lines.
+///
+/// # Errors
+/// As [`Panorama::read_with`] where the header is concerned.
+pub fn attributes(path: impl AsRef<Path>) -> Result<BTreeMap<String, String>> {
+    let path = path.as_ref();
+    let read = || {
+        let mut file = open(path)?;
+        match kind(&mut file, path)? {
+            Kind::Exr => exr::attributes(file, path),
+            Kind::Hdr { strict } => hdr::attributes(file, path, strict),
+        }
+    };
+    read().map_err(|e| e.in_file(path))
+}
+
+fn open(path: &Path) -> Result<BufReader<File>> {
+    let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+    if file.metadata().map_err(|e| Error::io(path, "read", e))?.is_dir() {
+        return Err(Error::invalid("is a folder, not an image"));
+    }
+    Ok(BufReader::with_capacity(1 << 16, file))
+}
+
+enum Kind {
+    Exr,
+    Hdr { strict: bool },
+}
+
+/// Formats of limited range that [`LdrPanorama::read`] reads: where the name of each stands.
+const LDR: &[(usize, &[u8], ImageFormat, &str)] = &[
+    (0, b"\x89PNG", ImageFormat::Png, "PNG"),
+    (0, b"\xFF\xD8\xFF", ImageFormat::Jpeg, "JPEG"),
+    (0, b"RIFF", ImageFormat::WebP, "WebP"),
+    #[cfg(feature = "avif")]
+    (4, b"ftypavif", ImageFormat::Avif, "AVIF"),
+];
+
+/// Formats that are not read: where the name of each stands.
+const FOREIGN: [(usize, &[u8], &str); 7] = [
+    // with the feature `avif` found before
+    (4, b"ftypavif", "(built without --features avif) AVIF"),
+    (4, b"ftypavis", "Animated AVIF"),
+    (4, b"ftypheic", "HEIF"),
+    (0, b"BM", "BMP"),
+    (0, b"GIF8", "GIF"),
+    (0, b"II*\0", "TIFF"),
+    (0, b"MM\0*", "TIFF"),
+];
+
+/// The first bytes of a file, which tell its format; rewinds.
+fn first_bytes(file: &mut (impl Read + Seek), path: &Path) -> Result<Vec<u8>> {
+    let mut start = Vec::new();
+    file.take(16).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
+    file.rewind().map_err(|e| Error::io(path, "read", e))?;
+    Ok(start)
+}
+
+/// Recognises a format that holds radiance and rewinds.
+fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
+    let start = first_bytes(file, path)?;
+    if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        return Ok(Kind::Exr);
+    }
+    if start.starts_with(b"#?") {
+        return Ok(Kind::Hdr { strict: start.starts_with(b"#?RADIANCE") });
+    }
+    if let Some((.., name)) = LDR.iter().find(|(at, magic, ..)| stands(&start, *at, magic)) {
+        return Err(Error::unsupported(format!(
+            "{name} holds no high dynamic range; `veni-cli prepare` expands such panoramas into EXR files first"
+        )));
+    }
+    Err(unknown(&start, "neither an OpenEXR nor a Radiance .hdr file"))
+}
+
+/// Whether a name stands at a place.
+fn stands(start: &[u8], at: usize, name: &[u8]) -> bool {
+    start.get(at..).is_some_and(|start| start.starts_with(name))
+}
+
+/// The error for content that is none of the formats looked for.
+fn unknown(start: &[u8], otherwise: &str) -> Error {
+    if start.is_empty() {
+        return Error::invalid("the file is empty");
+    }
+    match FOREIGN.iter().find(|(at, magic, _)| stands(start, *at, magic)) {
+        Some((.., name)) => Error::unsupported(format!(
+            "{name} images are not read; convert it to EXR, or to PNG if it holds no high dynamic range"
+        )),
+        None => Error::unsupported(otherwise),
+    }
+}

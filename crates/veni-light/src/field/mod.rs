@@ -1,0 +1,182 @@
+//! The decoder conditioned on one latent: a plain function from direction to radiance.
+//!
+//! [`Decoder`] holds a model's weights in the order the kernels read them. [`Decoder::condition`] folds a
+//! [`Latent`] into a few vectors and gives a [`Field`]. For a unit direction d (native frame, z up):
+//!
+//! 1. inputs pᵢ = zᵢ,x dx + zᵢ,y dy for the N vectors, d_z and √(dx² + dy²);
+//! 2. their sines and cosines at frequencies 1 and 4 and themselves, projected to h = 128 features x;
+//! 3. per layer x ← LN(x + a), x ← LN(x + W₂ max(0, W₁ x + b₁) + b₂), where a depends on the latent only;
+//! 4. log radiance = W x + b + the latent's log exposure.
+//!
+//! All entry points give the same bits for the same direction: one direction, a batch, a baked panorama. The
+//! kernels run at the widest SIMD the processor has.
+
+mod aligned;
+mod bake;
+#[cfg_attr(
+    not(all(target_arch = "x86_64", feature = "training")),
+    allow(dead_code, unreachable_pub, reason = "without kernels nothing reads what they are given")
+)]
+pub(crate) mod bfloat16;
+mod block;
+mod condition;
+pub(crate) mod gradient;
+mod math;
+mod mlp;
+mod rate;
+mod single;
+mod tasks;
+mod weights;
+
+use std::sync::Arc;
+
+use crate::latent::Latent;
+use crate::model::Model;
+use crate::{Error, Result};
+use weights::Weights;
+
+#[cfg(feature = "training")]
+pub mod training;
+
+pub use gradient::{Curved, Gradient, NormalEquations};
+pub use rate::multiply_add_rate;
+
+/// Largest |z_x|, |z_y| of a latent. Beyond it f32 does not resolve the phase of the encoding; trained codes
+/// stay below 10.
+pub const MAX_COORDINATE: f32 = 65536.0;
+
+/// A decoder ready to be conditioned. Cheap to clone.
+#[derive(Clone, Debug)]
+pub struct Decoder {
+    weights: Arc<Weights>,
+}
+
+/// The radiance field of one latent. Cheap to clone, usable from many threads.
+#[derive(Clone, Debug)]
+pub struct Field {
+    weights: Arc<Weights>,
+    folded: Arc<Folded>,
+}
+
+/// What remains of a latent.
+#[derive(Clone, Debug)]
+struct Folded {
+    /// xy of the latent vectors.
+    vectors: Vec<[f32; 2]>,
+    /// Bias of the residual projection plus the first layer's attention.
+    input_bias: Vec<f32>,
+    /// Zeros of the same length.
+    no_bias: Vec<f32>,
+    /// Per layer: β of its second norm plus the next layer's attention.
+    shift: Vec<Vec<f32>>,
+    log_exposure: f32,
+}
+
+/// A conditioned latent as plain numbers, for evaluators other than this module: a shader, for instance. h is the
+/// decoder's hidden size; the vectors may be longer, padded with zeros.
+#[derive(Clone, Copy, Debug)]
+pub struct FoldedLatent<'a> {
+    /// x and y of the N latent vectors.
+    pub vectors: &'a [[f32; 2]],
+    /// Bias of the input projection plus the first layer's attention.
+    pub input_bias: &'a [f32],
+    /// For every layer β of its second norm plus the next layer's attention.
+    pub shifts: &'a [Vec<f32>],
+    /// Added to the network's output.
+    pub log_exposure: f32,
+}
+
+impl Model {
+    /// The decoder of this model, packed for evaluation (about a millisecond). Keep it for many latents.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] if the network is not the paper's; see
+    /// [`check_folds`](crate::model::DecoderConfig::check_folds).
+    pub fn decoder(&self) -> Result<Decoder> {
+        self.config().decoder.check_folds()?;
+        Ok(Decoder { weights: Arc::new(Weights::new(self)) })
+    }
+}
+
+impl Decoder {
+    /// N, the number of latent vectors.
+    pub fn latent_vectors(&self) -> usize {
+        self.weights.latent_vectors
+    }
+
+    /// Folds a latent. Takes microseconds.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the latent has another number of vectors, belongs to another model, holds a number
+    /// that is not finite, or a coordinate beyond [`MAX_COORDINATE`].
+    pub fn condition(&self, latent: &Latent) -> Result<Field> {
+        let weights = &self.weights;
+        let (n, m) = (weights.latent_vectors, latent.vectors.len());
+        if n != m {
+            return Err(Error::invalid(format!("the latent has {m} vectors, the model needs {n}")));
+        }
+        if let Some(model) = latent.model.as_ref().filter(|model| **model != weights.model) {
+            let ours = &weights.model;
+            return Err(Error::invalid(format!(
+                "the latent belongs to model {model}, this is {ours}; load that model, or encode or fit again"
+            )));
+        }
+        latent.check_finite()?;
+        let large = |v: &[f32; 3]| v.iter().any(|c| c.abs() > MAX_COORDINATE);
+        if let Some(i) = latent.vectors.iter().position(large) {
+            let v = latent.vectors[i];
+            return Err(Error::invalid(format!("latent vector {i} is {v:?}, beyond {MAX_COORDINATE}")));
+        }
+        let attention = condition::attention(weights, latent);
+        let plus = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a + b).collect::<Vec<f32>>();
+        let mut input_bias = plus(&weights.input_bias, &attention[0]);
+        input_bias.resize(weights.mlp.padded(), 0.0);
+        let next = attention[1..].iter().map(Some).chain([None]);
+        let shift = weights.attention.iter().zip(next);
+        let shift = shift.map(|(layer, next)| match next {
+            Some(attention) => plus(&layer.beta2, attention),
+            None => layer.beta2.clone(),
+        });
+        let folded = Folded {
+            vectors: latent.vectors.iter().map(|[x, y, _]| [*x, *y]).collect(),
+            no_bias: vec![0.0; weights.mlp.padded()],
+            input_bias,
+            shift: shift.collect(),
+            log_exposure: latent.log_exposure,
+        };
+        Ok(Field { weights: Arc::clone(weights), folded: Arc::new(folded) })
+    }
+}
+
+impl Field {
+    /// What conditioning left of the latent.
+    pub fn folded(&self) -> FoldedLatent<'_> {
+        let Folded { vectors, input_bias, shift, log_exposure, .. } = &*self.folded;
+        FoldedLatent { vectors, input_bias, shifts: shift, log_exposure: *log_exposure }
+    }
+
+    /// The same scene turned by `radians` about z, counter-clockwise seen from above. Exact: it turns the latent,
+    /// not the picture.
+    #[must_use]
+    pub fn turned(&self, radians: f64) -> Self {
+        let (sin, cos) = radians.sin_cos();
+        let turn = |[x, y]: &[f32; 2]| {
+            let (x, y) = (f64::from(*x), f64::from(*y));
+            [(x * cos - y * sin) as f32, (x * sin + y * cos) as f32]
+        };
+        let mut folded = Folded::clone(&self.folded);
+        folded.vectors = folded.vectors.iter().map(turn).collect();
+        Self { weights: Arc::clone(&self.weights), folded: Arc::new(folded) }
+    }
+
+    /// The same scene `stops` brighter: radiance times 2^stops.
+    #[must_use]
+    pub fn brightened(&self, stops: f32) -> Self {
+        let mut folded = Folded::clone(&self.folded);
+        folded.log_exposure += stops * std::f32::consts::LN_2;
+        Self { weights: Arc::clone(&self.weights), folded: Arc::new(folded) }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,171 @@
+//! Hyper-parameters of a model, as stored in its file and in a run's `config.toml`.
+
+use serde::{Deserialize, Serialize};
+
+use super::DecoderConfig;
+use crate::sphere::StripeSampling;
+use crate::{Error, Result};
+
+/// Everything needed to build a model's modules and to check its weight file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelConfig {
+    /// Auto-encoder or auto-decoder.
+    pub kind: ModelKind,
+    /// N, the number of latent vectors in R³; the paper's D is 3N.
+    pub latent_vectors: usize,
+    /// The conditional neural field.
+    #[serde(default)]
+    pub decoder: DecoderConfig,
+    /// The VN-ViT; absent in a decode-only model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub encoder: Option<EncoderConfig>,
+}
+
+impl ModelConfig {
+    /// The paper's decoder for N latent vectors, without an encoder.
+    pub fn decode_only(latent_vectors: usize) -> Self {
+        Self { kind: ModelKind::Veni, latent_vectors, decoder: DecoderConfig::default(), encoder: None }
+    }
+
+    /// Checks every size: positive, and small enough that products of sizes stay far from overflow.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field, its value and what is allowed.
+    pub fn validate(&self) -> Result<()> {
+        within("latent_vectors", self.latent_vectors, 4096)?;
+        self.decoder.validate()?;
+        let Some(encoder) = &self.encoder else { return Ok(()) };
+        within("encoder.stripes", encoder.stripes, 1 << 16)?;
+        within("encoder.samples", encoder.samples.unwrap_or(1), 1 << 20)?;
+        within("encoder.channels", encoder.channels, 8192)?;
+        within("encoder.depth", encoder.depth, 256)?;
+        within("encoder.heads", encoder.heads, 1024)?;
+        within("encoder.head_channels", encoder.head_channels, 1024)?;
+        within("encoder.feedforward", encoder.feedforward, 64)
+    }
+}
+
+pub(super) fn within(name: &str, value: usize, most: usize) -> Result<()> {
+    if (1..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("{name} = {value} is not between 1 and {most}")))
+}
+
+/// Which system the weights belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ModelKind {
+    /// Variational auto-encoder.
+    Veni,
+    /// RENI++ auto-decoder.
+    Reni,
+}
+
+/// What the VN-ReLU subtracts when ⟨q, k⟩ < 0 (the Vector-Neuron paper against the authors' program).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum VnReluForm {
+    /// q − ⟨q, k⟩/|k|² · k: the true projection (Deng et al. 2021). The default.
+    #[default]
+    Projection,
+    /// q − ⟨q, k⟩/|k| · k with |k| = √max(Σk², 1e-6): the authors' `vn_layers`.
+    Reference,
+    /// q − ⟨q, k⟩/|k| · k with |k| = max(‖k‖, 1e-6): the authors' `sox_layers`, and RENI++.
+    ReferenceNormGuard,
+}
+
+/// Vector-Neuron (coordinates never mixed) or SO(2) fully connected (equivariant and invariant parts).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum VectorLayer {
+    /// Vector Neurons.
+    Vn,
+    /// SO(2) fully connected.
+    So2,
+}
+
+/// How the six feature coordinates (x, y, z, r, g, b) become the three of a latent vector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reduction {
+    /// The projection into the transformer drops to three.
+    EarlyLearned,
+    /// Six come out, the first three are kept.
+    LateSplit,
+    /// The output projection drops to three.
+    LateLearned,
+}
+
+/// Which tokens leave the transformer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pooling {
+    /// A class token with learned invariant coordinates.
+    Cls,
+    /// The mean over all tokens.
+    Mean,
+}
+
+/// The Vector-Neuron Vision Transformer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EncoderConfig {
+    /// T, the number of stripes (patches).
+    pub stripes: usize,
+    /// P, samples per stripe; T·P/2 must be a square. `None`: every sample is a token of one channel.
+    pub samples: Option<usize>,
+    /// Channels of a token.
+    pub channels: usize,
+    /// Transformer blocks.
+    pub depth: usize,
+    /// Attention heads.
+    pub heads: usize,
+    /// Channels per head.
+    pub head_channels: usize,
+    /// Feed-forward expansion.
+    pub feedforward: usize,
+    /// Layer that maps samples to channels.
+    pub project_in: VectorLayer,
+    /// Layers of the transformer.
+    pub transformer: VectorLayer,
+    /// Layers that read the latent from the output token.
+    pub project_out: VectorLayer,
+    /// Where six coordinates become three.
+    pub reduction: Reduction,
+    /// Output token.
+    pub pooling: Pooling,
+    /// Whether the class token's invariant coordinates are trained.
+    pub learnable_cls: bool,
+    /// Whether a variance is predicted.
+    pub variational: bool,
+    /// Form of the VN-ReLU.
+    pub vn_relu: VnReluForm,
+    /// Sampling of the panorama.
+    pub sampling: StripeSampling,
+}
+
+impl Default for EncoderConfig {
+    /// The paper's size.
+    fn default() -> Self {
+        Self {
+            stripes: 64,
+            samples: Some(512),
+            channels: 256,
+            depth: 6,
+            heads: 8,
+            head_channels: 32,
+            feedforward: 4,
+            project_in: VectorLayer::So2,
+            transformer: VectorLayer::Vn,
+            project_out: VectorLayer::So2,
+            reduction: Reduction::LateLearned,
+            pooling: Pooling::Cls,
+            learnable_cls: true,
+            variational: true,
+            vn_relu: VnReluForm::Projection,
+            sampling: StripeSampling::Exact,
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! The model: its configuration and its weight file, the bridge between training and use.
+//!
+//! The file is safetensors. Tensors are f32 or f16, named by dotted path: `decoder.*` (exactly
+//! [`decoder_schema`]), `encoder.*` (optional; checked by the learning world, carried as it is here) and
+//! `prior.*` (optional; see [`Model::prior`]). The header entry `veni` is JSON: `format`, `kind`, `config`
+//! ([`ModelConfig`]), `frame` (always `z-up`) and provenance ([`ModelInfo`]).
+//!
+//! A [`Model`] in memory has passed all checks, so what is built from it cannot fail.
+
+mod config;
+mod decoder;
+mod file;
+mod filler;
+mod header;
+#[cfg(feature = "pretrained")]
+mod pretrained;
+mod prior;
+mod schema;
+
+use std::collections::BTreeMap;
+
+use sha2::{Digest, Sha256};
+
+pub use config::{
+    EncoderConfig, ModelConfig, ModelKind, Pooling, Reduction, VectorLayer, VnReluForm,
+};
+pub use decoder::{Conditioning, DecoderConfig, Encoding, Equivariance, Invariance, OutputForm};
+pub use file::{MAX_FILE_BYTES, StoredType};
+pub use header::{FORMAT, ModelInfo, Training};
+pub use schema::decoder_schema;
+pub use schema::mapping_sizes;
+
+use crate::{Error, Result};
+
+/// A named tensor's content, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tensor {
+    /// Sizes, slowest first; their product is the number of values.
+    pub shape: Vec<usize>,
+    /// Values; all finite once inside a [`Model`].
+    pub data: Vec<f32>,
+}
+
+/// A checked set of weights with its configuration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    config: ModelConfig,
+    tensors: BTreeMap<String, Tensor>,
+    info: ModelInfo,
+}
+
+impl Model {
+    /// Checks the configuration and the tensors and puts them together.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if a decoder tensor is missing, unexpected or has the wrong shape (both are named),
+    /// if an encoder is there that the configuration does not describe, if the prior is malformed, or if a
+    /// value is not finite.
+    pub fn new(config: ModelConfig, tensors: BTreeMap<String, Tensor>, info: ModelInfo) -> Result<Self> {
+        config.validate()?;
+        let schema: BTreeMap<_, _> = decoder_schema(&config).into_iter().collect();
+        for (name, shape) in &schema {
+            let Some(tensor) = tensors.get(name) else {
+                return Err(Error::invalid(format!("tensor {name} {shape:?} is missing")));
+            };
+            if tensor.shape != *shape {
+                let found = &tensor.shape;
+                return Err(Error::invalid(format!(
+                    "tensor {name} is {found:?}, the configuration says {shape:?}"
+                )));
+            }
+        }
+        for (name, tensor) in &tensors {
+            let known = schema.contains_key(name)
+                || name.starts_with("prior.")
+                || name.starts_with("encoder.") && config.encoder.is_some();
+            if !known {
+                let shape = &tensor.shape;
+                return Err(Error::invalid(format!("tensor {name} {shape:?} is unexpected in this model")));
+            }
+            if tensor.shape.iter().try_fold(1usize, |n, d| n.checked_mul(*d)) != Some(tensor.data.len()) {
+                let (shape, count) = (&tensor.shape, tensor.data.len());
+                return Err(Error::invalid(format!("tensor {name} {shape:?} has {count} values")));
+            }
+            if let Some((at, value)) = tensor.data.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+                return Err(Error::invalid(format!("tensor {name}: value {at} is {value}")));
+            }
+        }
+        prior::check(&tensors, config.latent_vectors)?;
+        Ok(Self { config, tensors, info })
+    }
+
+    /// The hyper-parameters.
+    pub fn config(&self) -> &ModelConfig {
+        &self.config
+    }
+
+    /// N, the number of latent vectors.
+    pub fn latent_vectors(&self) -> usize {
+        self.config.latent_vectors
+    }
+
+    /// Where the weights come from.
+    pub fn info(&self) -> &ModelInfo {
+        &self.info
+    }
+
+    /// Replaces the provenance; nothing that is computed changes.
+    pub fn set_info(&mut self, info: ModelInfo) {
+        self.info = info;
+    }
+
+    /// All tensors by name, in alphabetical order.
+    pub fn tensors(&self) -> &BTreeMap<String, Tensor> {
+        &self.tensors
+    }
+
+    /// One tensor by its full name, e.g. `decoder.output.bias`.
+    pub fn tensor(&self, name: &str) -> Option<&Tensor> {
+        self.tensors.get(name)
+    }
+
+    /// Whether there are encoder weights; a model without them only decodes.
+    pub fn has_encoder(&self) -> bool {
+        self.tensors.keys().any(|name| name.starts_with("encoder."))
+    }
+
+    /// The same decoder and prior without the encoder.
+    #[must_use]
+    pub fn without_encoder(mut self) -> Self {
+        self.tensors.retain(|name, _| !name.starts_with("encoder."));
+        self.config.encoder = None;
+        self
+    }
+
+    /// Identity of the decoder: 16 hexadecimal digits. A latent carries it, because a code means something
+    /// only to the decoder it was made for.
+    ///
+    /// The first 8 bytes of SHA-256 over, one after the other: the JSON of `[latent_vectors, decoder config]`,
+    /// then for every decoder tensor in alphabetical order its name, a zero byte, and its values rounded to
+    /// half precision, little endian. Encoder, prior and provenance do not enter, and neither does the stored
+    /// type: stripping the encoder or storing f16 leaves existing latents valid.
+    pub fn hash(&self) -> String {
+        let mut sha = Sha256::new();
+        let sizes = (self.config.latent_vectors, &self.config.decoder);
+        sha.update(serde_json::to_vec(&sizes).unwrap_or_default());
+        for (name, tensor) in self.tensors.iter().filter(|(name, _)| name.starts_with("decoder.")) {
+            sha.update(name.as_bytes());
+            sha.update([0]);
+            let halves = tensor.data.iter().flat_map(|v| half::f16::from_f32(*v).to_le_bytes());
+            sha.update(halves.collect::<Vec<u8>>());
+        }
+        sha.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Identity of all weights, encoder and prior included: the first 8 bytes of SHA-256, as 16 hexadecimal digits, over
+    /// the JSON of the configuration, then for every tensor in alphabetical order its name, a zero byte, and its
+    /// values as f32, little endian. Provenance does not enter.
+    pub fn digest(&self) -> String {
+        let mut sha = Sha256::new();
+        sha.update(serde_json::to_vec(&self.config).unwrap_or_default());
+        for (name, tensor) in &self.tensors {
+            sha.update(name.as_bytes());
+            sha.update([0]);
+            sha.update(tensor.data.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
+        }
+        sha.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

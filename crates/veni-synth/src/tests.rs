@@ -1,0 +1,194 @@
+//! Whole scenes: seeds, energy, the sun's place, the order of brightness by hour and weather.
+
+use super::*;
+use veni_image::{Panorama, luminance};
+use veni_light::sphere::Equirect;
+
+const SMALL: Equirect = Equirect { width: 32, height: 16 };
+
+/// A clear noon on a plain with nothing on it.
+fn clear(elevation: f32) -> Scene {
+    let fixed = Fixed {
+        sky: Some(SkyKind::Clear),
+        place: Some(Place::Plain),
+        sun_elevation: Some(elevation),
+        sun_azimuth: Some(40.0),
+        turbidity: Some(2.5),
+        cloud_cover: Some(0.0),
+        ..Fixed::default()
+    };
+    Scene { ridges: Vec::new(), fullness: 0.0, white: [1.0; 3], ..Scene::draw(3, 1, &fixed) }
+}
+
+/// ∫ Y max(⟨n, d⟩, 0) dω, in klx.
+fn illuminance(panorama: &Panorama, normal: [f32; 3]) -> f64 {
+    let grid = panorama.grid();
+    let mut sum = 0.0;
+    for (k, (pixel, d)) in panorama.pixels().iter().zip(grid.directions()).enumerate() {
+        let cosine: f32 = d.iter().zip(normal).map(|(a, b)| a * b).sum();
+        sum += f64::from(luminance(*pixel) * cosine.max(0.0)) * grid.solid_angle(k / grid.width);
+    }
+    sum
+}
+
+#[test]
+fn a_scene_is_a_function_of_seed_and_index_whatever_the_threads() {
+    let fixed = Fixed::default();
+    let in_pool = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| render(&Scene::draw(5, 11, &fixed), SMALL))
+    };
+    let first = in_pool(1);
+    assert_eq!(first, in_pool(3));
+    for (seed, index) in [(5, 12), (6, 11)] {
+        assert_ne!(first, render(&Scene::draw(seed, index, &fixed), SMALL));
+    }
+    for place in Place::ALL {
+        assert_eq!(serde_json::to_value(place).unwrap(), place.name());
+    }
+    for sky in SkyKind::ALL {
+        assert_eq!(serde_json::to_value(sky).unwrap(), sky.name());
+    }
+    // and the parameters say it all
+    let scene = Scene::draw(5, 11, &fixed);
+    let text = serde_json::to_string(&scene).unwrap();
+    assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), scene);
+    // what is fixed is kept, and the rest stays as it was
+    let fixed = Fixed { sun_azimuth: Some(12.0), turbidity: Some(4.0), ..fixed };
+    let turned = Scene::draw(5, 11, &fixed);
+    assert_eq!((turned.sun_azimuth, turned.turbidity), (12.0, 4.0));
+    assert_eq!(turned, Scene { sun_azimuth: 12.0, turbidity: 4.0, ..scene });
+}
+
+#[test]
+fn every_kind_of_scene_is_positive_and_finite() {
+    let count = Place::ALL.len() * SkyKind::ALL.len();
+    let mut ranges = Vec::new();
+    for k in 0..count {
+        let fixed = Fixed {
+            sky: Some(SkyKind::ALL[k % SkyKind::ALL.len()]),
+            place: Some(Place::ALL[k / SkyKind::ALL.len()]),
+            ..Fixed::default()
+        };
+        let panorama = render(&Scene::draw(1, k as u64, &fixed), SMALL);
+        let values = panorama.pixels().as_flattened();
+        assert!(values.iter().all(|v| v.is_finite() && *v > 0.0), "{fixed:?}");
+        let (low, high) = values.iter().fold((f32::MAX, 0f32), |(a, b), v| (a.min(*v), b.max(*v)));
+        ranges.push((high / low).ln());
+    }
+    ranges.sort_unstable_by(f32::total_cmp);
+    // stops of an outdoor scene: dark corners to sky, or to the sun
+    assert!(ranges[0] > 1.0 && (4.0..14.0).contains(&ranges[count / 2]), "{ranges:?}");
+}
+
+#[test]
+fn the_sun_is_where_it_was_asked_for_with_its_energy_at_any_size() {
+    let scene = clear(35.0);
+    let towards = scene.sun();
+    let near_sun = |grid: Equirect, scene: &Scene| {
+        let panorama = render(scene, grid);
+        let (mut sum, mut brightest) = (0.0, (0f32, [0.0; 3]));
+        for (k, (pixel, d)) in panorama.pixels().iter().zip(grid.directions()).enumerate() {
+            let cosine: f32 = d.iter().zip(towards).map(|(a, b)| a * b).sum();
+            let y = luminance(*pixel);
+            if cosine > 0.98 {
+                sum += f64::from(y) * grid.solid_angle(k / grid.width);
+            }
+            if y > brightest.0 {
+                brightest = (y, d);
+            }
+        }
+        (sum, brightest.1)
+    };
+    let sizes = [64, 160, 320].map(|w| near_sun(Equirect::new(w, w / 2), &scene));
+    for (energy, direction) in &sizes {
+        // 60 to 90 klx of direct light, and a few of the aureole within 11°
+        assert!((60.0..100.0).contains(energy), "{energy} klx");
+        assert!((energy - sizes[2].0).abs() < 0.02 * sizes[2].0, "{energy} against {}", sizes[2].0);
+        let cosine: f32 = direction.iter().zip(towards).map(|(a, b)| a * b).sum();
+        assert!(cosine > 0.997, "{direction:?} for {towards:?}");
+    }
+    // the disc resolved has the radiance that a sun of 6.8e-5 sr must have
+    let (stage, fine) = (stage::Stage::new(&scene), Equirect::new(4096, 2048));
+    let mut pixels = vec![glam::Vec3::ZERO; fine.len()];
+    disc::add_discs(&stage, fine, &mut pixels);
+    let (mut solid, mut energy, mut middle) = (0.0, 0.0, 0.0f64);
+    for (k, pixel) in pixels.iter().enumerate().filter(|(_, p)| p.y > 0.0) {
+        let (y, angle) = (f64::from(luminance(pixel.to_array())), fine.solid_angle(k / fine.width));
+        (solid, energy, middle) = (solid + angle, energy + y * angle, middle.max(y));
+    }
+    // pixels on the border are lit in part; the mean of a limb-darkened disc is 0.8 of its middle
+    assert!((6.8e-5..1.05e-4).contains(&solid), "{solid} sr");
+    assert!((middle * 0.8 * 6.8e-5 - energy).abs() < 0.15 * energy, "{middle} kcd/m² for {energy} klx");
+    let source = f64::from(luminance(stage.sky.sources[0].clear.to_array()));
+    assert!((energy - source).abs() < 1e-3 * source, "{energy} of {source} klx");
+    // cloud takes it away
+    let overcast = Scene::draw(
+        3,
+        1,
+        &Fixed { sky: Some(SkyKind::Overcast), sun_elevation: Some(35.0), ..Fixed::default() },
+    );
+    let overcast =
+        Scene { sun_azimuth: 40.0, ridges: Vec::new(), fullness: 0.0, place: Place::Plain, ..overcast };
+    assert!(near_sun(Equirect::new(64, 32), &overcast).0 < 0.1 * sizes[0].0);
+}
+
+#[test]
+fn a_hidden_sun_is_moved_to_where_it_is_in_view() {
+    let clear = Fixed { place: Some(Place::Square), sky: Some(SkyKind::Clear), ..Fixed::default() };
+    let in_view = |s: &Scene| stage::Stage::new(s).is_clear(s.sun_direction(), f32::INFINITY);
+    let mut moved = 0;
+    for index in 0..40 {
+        let up = Scene::draw(4, index, &Fixed { sun_elevation: Some(18.0), ..clear });
+        // below the horizon nobody looks for it, and the azimuth drawn is the same
+        let down = Scene::draw(4, index, &Fixed { sun_elevation: Some(-1.0), ..clear });
+        let first = Scene { sun_azimuth: down.sun_azimuth, ..up.clone() };
+        if first != up {
+            moved += 1;
+            assert!(in_view(&up) && !in_view(&first), "scene {index}");
+        }
+    }
+    assert!((4..30).contains(&moved), "{moved} of 40");
+}
+
+#[test]
+fn illuminance_follows_hour_and_weather() {
+    let grid = Equirect::new(96, 48);
+    let up = |scene: &Scene| illuminance(&render(scene, grid), [0.0, 0.0, 1.0]);
+    // textbooks: 100 klx from sun and sky at 60°, 20 to 40 klx at 20°, 400 lx at sunset, 3 lx at −6°
+    for (elevation, low, high) in
+        [(60.0, 80.0, 125.0), (20.0, 20.0, 42.0), (0.0, 0.15, 1.2), (-6.0, 5e-4, 1e-2)]
+    {
+        let scene = clear(elevation);
+        let klx = up(&scene);
+        assert!((low..high).contains(&klx), "{elevation}°: {klx} klx");
+        // light from below is the ground's albedo times that
+        if elevation > 10.0 {
+            let below = illuminance(&render(&scene, grid), [0.0, 0.0, -1.0]);
+            let albedo = luminance(scene.ground.albedo());
+            assert!(
+                (0.6..1.6).contains(&(below / klx / f64::from(albedo))),
+                "{below} of {klx} with {albedo}"
+            );
+        }
+    }
+    let night = Scene { moon: None, glow: [0.0; 3], lit: false, ..clear(-30.0) };
+    // starlight: 0.2 to 2 mlx
+    assert!((1e-7..3e-6).contains(&up(&night)), "{} klx", up(&night));
+    let moon = Moon { elevation: 45.0, azimuth: 0.0, phase: 0.0 };
+    let moonlit = up(&Scene { moon: Some(moon), ..night });
+    assert!((5e-5..3e-4).contains(&moonlit), "{moonlit} klx");
+}
+
+#[test]
+fn fixed_values_out_of_range_are_refused_by_name() {
+    for (fixed, name) in [
+        (Fixed { turbidity: Some(0.5), ..Fixed::default() }, "turbidity 0.5"),
+        (Fixed { cloud_cover: Some(1.5), ..Fixed::default() }, "cloud cover 1.5"),
+        (Fixed { sun_elevation: Some(f32::NAN), ..Fixed::default() }, "sun elevation"),
+    ] {
+        let message = fixed.check().unwrap_err().to_string();
+        assert!(message.contains(name), "{message}");
+    }
+    assert!(Fixed::default().check().is_ok());
+}
