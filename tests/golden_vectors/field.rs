@@ -11,7 +11,7 @@ use veni::model::{Conditioning, DecoderConfig, Encoding, Equivariance, Invarianc
 use veni::sphere::Equirect;
 use veni::sphere::reference::decoder_directions;
 use veni::vae::decoder::{Decoder, reni_2022_inputs, rotate};
-use veni::vae::weights::{self, Weight, Weights};
+use veni::vae::weights::{self, Array, Weights};
 
 /// See [`Family`](crate::Family).
 pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
@@ -249,7 +249,7 @@ pub(crate) fn compare_records(case: &Case, sizes: &Sizes, record: &str, ours: &W
         if !case.expects(&name) {
             continue;
         }
-        let zero = || Weight { shape: vec![], data: vec![0.0; binding.shape.iter().product()] };
+        let zero = || Array { shape: vec![], data: vec![0.0; binding.shape.iter().product()] };
         let mut values = ours.get(&binding.ours).cloned().unwrap_or_else(zero);
         values.data = sizes.reorder(&binding, values.data, false);
         let mut shape = binding.shape.clone();

@@ -32,7 +32,7 @@ fn model(source: &Case) -> Model {
     let config = ModelConfig { decoder: config, ..ModelConfig::decode_only(n) };
     let tensors: BTreeMap<_, _> = weights::read(&decoder, "decoder")
         .into_iter()
-        .map(|(name, w)| (name, veni::model::Tensor { shape: w.shape, data: w.data }))
+        .map(|(name, w)| (name, veni::model::Array { shape: w.shape, data: w.data }))
         .collect();
     Model::new(config, tensors, ModelInfo::default()).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -16,7 +16,8 @@ use veni_core::train::network::{Network, Prepared};
 use veni_core::train::optimiser::{Group, Optimiser};
 use veni_core::train::presets::Preset;
 use veni_core::train::replicas::{Computed, Replicas};
-use veni_core::vae::weights::{self, Weight, Weights};
+use veni_core::model::Array;
+use veni_core::vae::weights::{self, Weights};
 use veni_core::{Error, Result};
 
 /// As the training example.
@@ -104,13 +105,13 @@ fn record(path: &Path, network: &Network, batch: &Prepared, computed: &Computed)
     let Prepared::Panoramas(batch) = batch else {
         return Err(Error::invalid("only steps of auto-encoders are recorded"));
     };
-    let under = |prefix: &str, weights: Weights| -> Vec<(String, Weight)> {
+    let under = |prefix: &str, weights: Weights| -> Vec<(String, Array)> {
         weights.into_iter().map(|(name, weight)| (format!("{prefix}.{name}"), weight)).collect()
     };
     let mut all: Weights = under("weight", weights::read(network, "")).into_iter().collect();
     all.extend(under("gradient", computed.gradients.clone()));
     for (name, value) in &computed.parts {
-        all.insert(format!("loss.{name}"), Weight { shape: vec![1], data: vec![*value as f32] });
+        all.insert(format!("loss.{name}"), Array { shape: vec![1], data: vec![*value as f32] });
     }
     let ([rows, columns], images) = (batch.loss_size, batch.images);
     let Network::Veni(veni) = network else { unreachable!("batches of panoramas are an auto-encoder's") };
@@ -123,7 +124,7 @@ fn record(path: &Path, network: &Network, batch: &Prepared, computed: &Computed)
         ("target", &batch.target, vec![images, rows, columns, 3]),
         ("noise", &batch.noise, vec![images, veni.latent_vectors(), 3]),
     ] {
-        all.insert(format!("batch.{name}"), Weight { shape, data: data.clone() });
+        all.insert(format!("batch.{name}"), Array { shape, data: data.clone() });
     }
     checkpoint::save(path, &all, &CheckpointInfo::new(batch.step, None))
 }

@@ -1,5 +1,5 @@
 //! VENI on burn: the equivariant layers ([`nn`]), encoder and decoder ([`vae`]), losses and training ([`train`]), latent
-//! optimisation under any decoder and objective ([`fit`]).
+//! optimisation under any decoder and objective ([`fit`]), weights of other programs ([`import`]).
 //!
 //! One entrance to what stands below it, none of which knows burn:
 //!
@@ -16,10 +16,13 @@
 #![forbid(unsafe_code)]
 
 pub mod fit;
+pub mod import;
+mod loaded;
 pub mod nn;
 pub mod train;
 pub mod vae;
 
+pub use loaded::LoadedModel;
 pub use veni_data::{self as data, expand, prepare};
 pub use veni_fit::shade;
 pub use veni_image as panorama;

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::subject::Subject;
+use veni_core::LoadedModel;
 use crate::Result;
 use veni_data::coarsen::{averaged, coarse_grid};
 use veni_core::fit::{self, FitConfig, FitResult, FitTarget, Method};
@@ -63,7 +63,7 @@ impl FitSettings {
     /// As [`fit::fit`].
     pub fn fit(
         &self,
-        subject: &Subject,
+        subject: &LoadedModel,
         grid: Equirect,
         images: &[&[f32]],
         start: &[Latent],

@@ -1,19 +1,21 @@
-//! Metrics and evaluation protocols.
+//! Evaluation: the protocols of the papers' tables and figures, the baselines, LPIPS.
 //!
 //! | question | here |
 //! |---|---|
-//! | how close are two images? | [`metrics`], [`lpips`], [`reconstruction`] (both averaged over a set) |
-//! | who is compared? | [`subject`] (models), [`codec`] (anything that codes a panorama in D numbers) |
+//! | how close are two images? | [`veni_image::metrics`], [`lpips`] |
+//! | who is compared? | [`veni_core::LoadedModel`], [`baseline`], [`codec`] (anything that codes a panorama in D values) |
 //! | how, exactly? | [`protocol`]: one file per experiment |
 //! | where do results go? | [`store`] (kept while running), [`table`], [`figure`] |
 
+#![forbid(unsafe_code)]
+
+pub mod baseline;
 pub mod codec;
 pub mod figure;
 pub mod fitting;
 pub mod lpips;
-pub mod metrics;
 pub mod protocol;
-pub mod reconstruction;
 pub mod store;
-pub mod subject;
 pub mod table;
+
+pub use veni_core::{Error, Result};

@@ -6,7 +6,10 @@ mod whole_loss;
 #[cfg(test)]
 mod tests;
 
-pub use veni_fit::*;
+pub use veni_fit::{
+    Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective, Observation,
+    PanoramaLoss, Picture, Plateau, from_each, loss, matching_exposure, random_starts, schedule, shade,
+};
 
 use burn::tensor::Device;
 use veni_light::field;

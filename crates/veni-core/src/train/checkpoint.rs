@@ -12,7 +12,8 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
 use veni_light::output::{Overwrite, write_atomic};
-use crate::vae::weights::{Weight, Weights};
+use crate::vae::weights::Weights;
+use veni_light::model::Array;
 use crate::{Error, Result};
 
 const KEY: &str = "veni-checkpoint";
@@ -101,7 +102,7 @@ fn parse(bytes: &[u8]) -> Result<(Weights, CheckpointInfo)> {
         if let Some(bad) = data.iter().find(|v| !v.is_finite()) {
             return Err(damaged(&format!("tensor {name} holds {bad}")));
         }
-        state.insert(name.to_owned(), Weight { shape: view.shape().to_vec(), data });
+        state.insert(name.to_owned(), Array { shape: view.shape().to_vec(), data });
     }
     Ok((state, info))
 }
@@ -118,7 +119,7 @@ mod tests {
     fn what_is_saved_comes_back_to_the_bit_and_damage_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("state.safetensors");
-        let values = Weight { shape: vec![2, 1], data: vec![0.1, -3e-30] };
+        let values = Array { shape: vec![2, 1], data: vec![0.1, -3e-30] };
         let state = Weights::from([("first.a".to_owned(), values)]);
         let info = CheckpointInfo::new(7, Some(Best { step: 5, ldr_psnr: 16.90000001 }));
         save(&path, &state, &info).unwrap();

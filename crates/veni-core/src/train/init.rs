@@ -9,7 +9,7 @@ use toml::Table;
 use veni_light::model::{Model, ModelKind};
 use crate::train::config::TrainConfig;
 use crate::train::network::Network;
-use crate::vae::weights::{self, Weight, Weights};
+use crate::vae::weights::{self, Weights};
 use crate::{Error, Result};
 
 /// The model whose weights a run begins with. Averages start from them, Adam's moments from 0.
@@ -76,9 +76,7 @@ pub fn apply(network: Network, config: &TrainConfig, model: &Model) -> Result<(N
     let part = |prefix: &str| -> Weights {
         let inside = |name: &&String| name.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('.'));
         let tensors = model.tensors().iter().filter(|(name, _)| inside(name));
-        tensors
-            .map(|(name, t)| (name.clone(), Weight { shape: t.shape.clone(), data: t.data.clone() }))
-            .collect()
+        tensors.map(|(name, t)| (name.clone(), t.clone())).collect()
     };
     let whole = config.model.kind == ModelKind::Veni && model.has_encoder();
     let differing = differences(config, model, whole)?;

@@ -20,5 +20,6 @@ pub mod progress;
 pub mod rays;
 pub mod replicas;
 pub mod run;
-pub mod schedule;
 pub mod step;
+
+pub use veni_fit::schedule;

@@ -17,7 +17,8 @@ use burn::tensor::Gradients;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::vae::weights::{self, Weight, Weights};
+use crate::vae::weights::{self, Weights};
+use veni_light::model::Array;
 use crate::{Error, Result};
 
 /// Adam's constants for one group.
@@ -162,9 +163,9 @@ impl Optimiser {
 
     /// Averaged weights.
     pub fn averages(&self) -> Weights {
-        let average = |(path, weight): (&String, &Weight)| {
+        let average = |(path, weight): (&String, &Array)| {
             let data = self.slots[path].average.clone();
-            (path.clone(), Weight { shape: weight.shape.clone(), data })
+            (path.clone(), Array { shape: weight.shape.clone(), data })
         };
         self.weights.iter().map(average).collect()
     }
@@ -174,7 +175,7 @@ impl Optimiser {
         let mut out = Weights::new();
         for ((path, slot), weight) in self.slots.iter().zip(self.weights.values()) {
             for (part, data) in PARTS.iter().zip([&weight.data, &slot.first, &slot.second, &slot.average]) {
-                let stored = Weight { shape: weight.shape.clone(), data: data.clone() };
+                let stored = Array { shape: weight.shape.clone(), data: data.clone() };
                 out.insert(format!("{part}.{path}"), stored);
             }
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::eval::reconstruction::MeanScores;
+use veni_image::metrics::MeanScores;
 
 /// One update, as written to `metrics.jsonl` and shown to the user.
 #[derive(Clone, Debug, PartialEq, Serialize)]

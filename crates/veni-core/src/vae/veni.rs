@@ -1,14 +1,12 @@
 //! Encoder and decoder together: the variational auto-encoder.
 
-use std::collections::BTreeMap;
-
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
 
-use super::weights::{self, Weight, Weights};
+use super::weights::{self, Weights};
 use super::{Decoder, Encoder};
-use veni_light::model::{self, Model, ModelConfig, ModelInfo};
+use veni_light::model::{Model, ModelConfig, ModelInfo};
 use veni_light::sphere::{Equirect, Stripes};
 use crate::{Error, Result};
 
@@ -56,8 +54,7 @@ impl Veni {
         let mut rng: rand_chacha::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
         let veni = Self::new(model.config(), &mut rng, device)?;
         let tensors = model.tensors().iter().filter(|(name, _)| !name.starts_with("prior."));
-        let weight = |t: &model::Tensor| Weight { shape: t.shape.clone(), data: t.data.clone() };
-        weights::write(veni, "", &tensors.map(|(name, t)| (name.clone(), weight(t))).collect())
+        weights::write(veni, "", &tensors.map(|(name, t)| (name.clone(), t.clone())).collect())
     }
 
     /// The model file's content, without a prior.
@@ -153,9 +150,7 @@ pub fn decode(decoder: &Decoder, grid: Equirect, latents: &[Vec<[f32; 3]>]) -> V
 /// # Errors
 /// [`Error::Invalid`] as [`Model::new`].
 pub fn model_of(weights: Weights, config: &ModelConfig, info: ModelInfo) -> Result<Model> {
-    let tensor = |w: Weight| model::Tensor { shape: w.shape, data: w.data };
-    let tensors: BTreeMap<_, _> = weights.into_iter().map(|(name, w)| (name, tensor(w))).collect();
-    Model::new(config.clone(), tensors, info)
+    Model::new(config.clone(), weights, info)
 }
 
 fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {

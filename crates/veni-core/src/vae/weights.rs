@@ -7,18 +7,10 @@ use crate::{Error, Result};
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{Gradients, Tensor, TensorData, Transaction};
 use std::collections::BTreeMap;
-
-/// The values of one parameter, row-major.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Weight {
-    /// Sizes, slowest first.
-    pub shape: Vec<usize>,
-    /// Values; as many as the product of the sizes.
-    pub data: Vec<f32>,
-}
+use veni_light::model::Array;
 
 /// Parameters by dotted path.
-pub type Weights = BTreeMap<String, Weight>;
+pub type Weights = BTreeMap<String, Array>;
 
 /// Every float parameter of a module; `prefix` (e.g. `decoder`, or empty) is put before each path.
 pub fn read<M: Module>(module: &M, prefix: &str) -> Weights {
@@ -96,7 +88,7 @@ fn collect<M: Module>(module: &M, prefix: &str, gradients: Option<&Gradients>) -
     module.visit(&mut reader);
     let numbers = |data: TensorData| data.convert::<f32>().try_into_vec().expect("just converted to f32");
     (reader.found.into_iter().zip(reader.values.execute()))
-        .map(|((name, shape), data)| (name, Weight { shape, data: numbers(data) }))
+        .map(|((name, shape), data)| (name, Array { shape, data: numbers(data) }))
         .collect()
 }
 
@@ -199,7 +191,7 @@ mod tests {
         assert!(other.input.weight.val().is_require_grad(), "still trainable");
         // Another module's tensors in the same file are no business of this one.
         let mut file = source.clone();
-        file.insert("encoder.class".into(), Weight { shape: vec![1], data: vec![0.0] });
+        file.insert("encoder.class".into(), Array { shape: vec![1], data: vec![0.0] });
         assert!(write(other, "decoder", &file).is_ok());
     }
 
@@ -218,7 +210,7 @@ mod tests {
         let short = message(&|w| w.get_mut("decoder.input.bias").unwrap().data.truncate(3));
         assert_eq!(short, "tensor decoder.input.bias [8] holds 3 values");
         let extra = message(&|w| {
-            w.insert("decoder.query".into(), Weight { shape: vec![1], data: vec![0.0] });
+            w.insert("decoder.query".into(), Array { shape: vec![1], data: vec![0.0] });
         });
         assert!(extra.starts_with("tensor decoder.query is not part"), "{extra}");
     }

@@ -5,21 +5,29 @@ use serde_json::{Value, json};
 use super::Codec;
 use crate::fitting::FitSettings;
 use veni_image::metrics::{Alignment, scores};
-use crate::reconstruction::Start;
-use crate::subject::Subject;
+use veni_core::LoadedModel;
 use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
 use crate::{Error, Result};
 
+/// Where the optimisation of a latent starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Start {
+    /// The mean of the encoder's posterior.
+    Encoder,
+    /// All vectors zero.
+    Zero,
+}
+
 /// The auto-encoder pass: the mean of the encoder's posterior.
 #[derive(Clone, Copy, Debug)]
 pub struct Autoencoder<'a> {
-    subject: &'a Subject,
+    subject: &'a LoadedModel,
 }
 
 impl<'a> Autoencoder<'a> {
     /// The pass of a model, if it has an encoder.
-    pub fn new(subject: &'a Subject) -> Option<Self> {
+    pub fn new(subject: &'a LoadedModel) -> Option<Self> {
         subject.veni().map(|_| Self { subject })
     }
 }
@@ -28,14 +36,14 @@ impl<'a> Autoencoder<'a> {
 /// where the encoder's latent has the higher LDR PSNR, it stays.
 #[derive(Clone, Copy, Debug)]
 pub struct Optimised<'a> {
-    subject: &'a Subject,
+    subject: &'a LoadedModel,
     settings: FitSettings,
     start: Start,
 }
 
 impl<'a> Optimised<'a> {
     /// From the encoder's latent, or from 0 where there is no encoder.
-    pub fn new(subject: &'a Subject, settings: FitSettings) -> Self {
+    pub fn new(subject: &'a LoadedModel, settings: FitSettings) -> Self {
         let start = if subject.veni().is_some() { Start::Encoder } else { Start::Zero };
         Self { subject, settings, start }
     }

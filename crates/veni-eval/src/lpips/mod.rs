@@ -6,7 +6,6 @@
 //!
 //! No weights come with this library: a user names files that have them, see [`Lpips::load`].
 
-mod checkpoint;
 #[cfg(test)]
 mod tests;
 mod weights;

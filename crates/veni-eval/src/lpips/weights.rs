@@ -7,8 +7,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::checkpoint::Checkpoint;
-use veni_core::vae::weights::Weight;
+use veni_core::import::Checkpoint;
+use veni_light::model::Array;
 use crate::{Error, Result};
 
 /// A convolution of AlexNet's feature extractor.
@@ -93,7 +93,7 @@ fn find(files: &[(&Path, Checkpoint)], names: &[String], shape: &[usize]) -> Res
         match hits.collect::<Vec<_>>().as_slice() {
             [] => {}
             [(path, file, full)] => {
-                let Weight { shape: found, data } = file.tensor(full).map_err(|e| e.in_file(path))?;
+                let Array { shape: found, data } = file.tensor(full).map_err(|e| e.in_file(path))?;
                 if found != shape {
                     return Err(Error::invalid(format!(
                         "{}: tensor {full} is {found:?}, LPIPS with AlexNet has {shape:?}",

@@ -12,7 +12,7 @@ use veni_light::random::{Purpose, normal, stream};
 use crate::figure::{Axis, Plot, Series};
 use veni_image::metrics::{log_error, spearman, weighted_log_error};
 use crate::store::Key;
-use crate::subject::Subject;
+use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
 use veni_light::latent::Latent;
 use crate::{Error, Result};
@@ -93,7 +93,7 @@ pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
 }
 
 /// Of [`standard`] alone.
-pub(super) fn keep_standard(run: &Evaluation<'_>, subject: &Subject, share: Share) -> Result<()> {
+pub(super) fn keep_standard(run: &Evaluation<'_>, subject: &LoadedModel, share: Share) -> Result<()> {
     distances(run, subject, Source::Standard, pairs(run)?).keep(run, share)
 }
 
@@ -106,7 +106,7 @@ fn pairs(run: &Evaluation<'_>) -> Result<usize> {
 }
 
 /// Spearman's correlation for N(0, 1) latents over all pixels alike, the paper's number.
-pub(super) fn standard(run: &Evaluation<'_>, subject: &Subject) -> Result<Cell> {
+pub(super) fn standard(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<Cell> {
     let distances = distances(run, subject, Source::Standard, pairs(run)?).all(run)?.concat();
     Ok(correlation(&distances, 1))
 }
@@ -119,7 +119,7 @@ fn correlation(distances: &[[f64; 3]], column: usize) -> Cell {
 /// Per block of pairs, for each: the squared difference of latents, of images, and of images by solid angle.
 fn distances<'a>(
     run: &Evaluation<'a>,
-    subject: &'a Subject,
+    subject: &'a LoadedModel,
     source: Source,
     pairs: usize,
 ) -> Work<'a, Vec<[f64; 3]>> {

@@ -6,7 +6,7 @@
 use super::quality::{self, reconstruct};
 use super::{Evaluation, Report, Share, reconstruction};
 use crate::figure::{Axis, Plot, Series};
-use crate::subject::Subject;
+use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
 
@@ -70,6 +70,6 @@ pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
     reconstruction::keep_models(run, share)
 }
 
-fn curve(subject: &Subject, pass: &str) -> String {
+fn curve(subject: &LoadedModel, pass: &str) -> String {
     format!("D = {}, {pass}", subject.dimension())
 }

@@ -14,7 +14,7 @@ use super::{Evaluation, Report};
 use crate::Result;
 use veni_data::augment::{mirror, turn_columns};
 use crate::figure::{Axis, Plot, Series};
-use crate::subject::Subject;
+use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
 use veni_light::latent::{Latent, Prior};
 use veni_data::parallel::parallel;
@@ -31,7 +31,7 @@ const NARROW: &str = "stripes are no whole number of pixels";
 /// As encoding, decoding and writing fail.
 pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     let mut report = Report::default();
-    let names: Vec<_> = run.subjects.iter().map(Subject::name).collect();
+    let names: Vec<_> = run.subjects.iter().map(LoadedModel::name).collect();
     let mut table =
         Table::new("equivariance", "Errors of equivariance", &[&["Measure"], names.as_slice()].concat());
     let mut columns: Vec<Vec<(&'static str, Cell)>> = Vec::new();
@@ -65,7 +65,7 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 
 /// Mean relative error of the latent over panoramas turned by one stripe, if there is an encoder and a stripe is a whole
 /// number of columns.
-pub(super) fn by_one_stripe(run: &Evaluation<'_>, subject: &Subject) -> Result<Cell> {
+pub(super) fn by_one_stripe(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<Cell> {
     Ok(match Encoding::of(run, subject)? {
         None => Cell::missing("no encoder"),
         Some(encoding) if encoding.stripe == 0 => Cell::missing(NARROW),
@@ -75,7 +75,7 @@ pub(super) fn by_one_stripe(run: &Evaluation<'_>, subject: &Subject) -> Result<C
 
 /// A model's latents of all panoramas as they are.
 struct Encoding<'a> {
-    subject: &'a Subject,
+    subject: &'a LoadedModel,
     grid: Equirect,
     images: Vec<&'a [f32]>,
     latents: Vec<Latent>,
@@ -84,7 +84,7 @@ struct Encoding<'a> {
 }
 
 impl<'a> Encoding<'a> {
-    fn of(run: &Evaluation<'a>, subject: &'a Subject) -> Result<Option<Self>> {
+    fn of(run: &Evaluation<'a>, subject: &'a LoadedModel) -> Result<Option<Self>> {
         let Some(stripes) = subject.stripes()? else { return Ok(None) };
         let grid = run.data.grid();
         let images: Vec<_> = run.data.items().iter().map(|item| item.log_radiance.as_slice()).collect();
@@ -110,7 +110,7 @@ impl<'a> Encoding<'a> {
 
 type Measures = Vec<(&'static str, Cell)>;
 
-fn encoder(run: &Evaluation<'_>, subject: &Subject) -> Result<(Measures, Option<Series>)> {
+fn encoder(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<(Measures, Option<Series>)> {
     let names = [
         ["encoder, one stripe, worst", "encoder, one stripe, mean"],
         ["encoder, a quarter turn, worst", "encoder, a quarter turn, mean"],
@@ -161,7 +161,7 @@ fn whole_model(encoding: &Encoding<'_>) -> Result<Cell> {
     Ok(Cell::Scientific(largest.fold(0.0, f64::max)))
 }
 
-fn decoder(run: &Evaluation<'_>, subject: &Subject) -> Result<Measures> {
+fn decoder(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<Measures> {
     let latents = match Encoding::of(run, subject)? {
         Some(encoding) => encoding.latents,
         None => {
@@ -193,7 +193,7 @@ fn decoder(run: &Evaluation<'_>, subject: &Subject) -> Result<Measures> {
 
 /// The largest difference between latents in directions, and moved latents in moved directions.
 fn against(
-    subject: &Subject,
+    subject: &LoadedModel,
     latents: &[Latent],
     latent: impl Fn(&Latent) -> Latent,
     direction: impl Fn([f32; 3]) -> [f32; 3],
@@ -208,7 +208,7 @@ fn against(
     Ok(worst)
 }
 
-fn evaluate(subject: &Subject, latent: &Latent, directions: &[[f32; 3]]) -> Result<Vec<f32>> {
+fn evaluate(subject: &LoadedModel, latent: &Latent, directions: &[[f32; 3]]) -> Result<Vec<f32>> {
     if let Some(field) = subject.field() {
         let mut values = vec![[0.0; 3]; directions.len()];
         field.condition(latent)?.log_radiance_batch(directions, &mut values);

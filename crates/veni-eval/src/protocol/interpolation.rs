@@ -11,7 +11,7 @@ use crate::codec::{Autoencoder, Codec, Optimised, model::latent};
 use crate::figure::{Axis, Plot, Series, Sheet, display};
 use crate::fitting::FitSettings;
 use veni_image::metrics::log_error;
-use crate::subject::Subject;
+use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
 use veni_light::latent::Latent;
 use crate::{Error, Result};
@@ -103,7 +103,7 @@ pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
 }
 
 /// What gives the ends their latents.
-fn codec<'a>(run: &Evaluation<'a>, subject: &'a Subject) -> Box<dyn Codec + 'a> {
+fn codec<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel) -> Box<dyn Codec + 'a> {
     let fit = FitSettings::thorough(run.data.grid(), run.settings.quick);
     match Autoencoder::new(subject) {
         Some(pass) => Box::new(pass),
@@ -111,7 +111,7 @@ fn codec<'a>(run: &Evaluation<'a>, subject: &'a Subject) -> Box<dyn Codec + 'a> 
     }
 }
 
-fn ways(run: &Evaluation<'_>, subject: &Subject) -> Result<Vec<Way>> {
+fn ways(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<Vec<Way>> {
     let (grid, frames) = (run.data.grid(), run.settings.frames);
     let latents: Vec<_> = codes(run, &*codec(run, subject))?.iter().map(|code| latent(code)).collect();
     let names: Vec<_> = run.data.items().iter().map(veni_data::Item::name).collect();
@@ -131,7 +131,7 @@ fn ways(run: &Evaluation<'_>, subject: &Subject) -> Result<Vec<Way>> {
     latents.windows(2).zip(names.windows(2)).map(way).collect()
 }
 
-fn draw(run: &Evaluation<'_>, subject: &Subject, ways: &[Way], report: &mut Report) -> Result<()> {
+fn draw(run: &Evaluation<'_>, subject: &LoadedModel, ways: &[Way], report: &mut Report) -> Result<()> {
     let grid = run.data.grid();
     let last = (run.settings.frames - 1) as f64;
     let titles: Vec<_> = (0..run.settings.frames).map(|k| format!("t = {:.2}", k as f64 / last)).collect();

@@ -15,7 +15,7 @@ use veni_data::Item;
 use crate::figure::{Axis, Plot, Series, Sheet, display};
 use veni_image::metrics::{Alignment, psnr};
 use crate::store::Key;
-use crate::subject::Subject;
+use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
 use veni_core::fit::{FitConfig, FitResult, fit_shaded, matching_exposure};
 use veni_light::latent::Latent;
@@ -147,7 +147,7 @@ pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
     Ok(())
 }
 
-fn fits<'a>(run: &Evaluation<'a>, subject: &'a Subject, set: Set, ks: f32) -> Work<'a, Found> {
+fn fits<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel, set: Set, ks: f32) -> Work<'a, Found> {
     let (grid, items) = (run.data.grid(), run.data.items());
     let keys: Vec<_> = (items.iter().zip(images(run)))
         .map(|(item, image)| Key {
@@ -166,7 +166,7 @@ fn fits<'a>(run: &Evaluation<'a>, subject: &'a Subject, set: Set, ks: f32) -> Wo
     })
 }
 
-fn swept(run: &Evaluation<'_>, subject: &Subject, set: Set, ks: f32) -> Result<Vec<One>> {
+fn swept(run: &Evaluation<'_>, subject: &LoadedModel, set: Set, ks: f32) -> Result<Vec<One>> {
     let (grid, items) = (run.data.grid(), run.data.items());
     let found = fits(run, subject, set, ks).all(run)?;
     let one = |(item, found): (&Item, &Found)| -> Result<One> {
@@ -197,7 +197,7 @@ fn light(grid: Equirect, item: &Item, set: Set) -> Panorama {
     Panorama::from_log(grid, pixels).resample(Equirect::new(set.lights, set.lights / 2))
 }
 
-fn fitted(subject: &Subject, grid: Equirect, item: &Item, set: Set, ks: f32) -> Result<Found> {
+fn fitted(subject: &LoadedModel, grid: Equirect, item: &Item, set: Set, ks: f32) -> Result<Found> {
     let transfer = ball(set, ks)?;
     let picture = transfer.render(light(grid, item, set).pixels());
     let image = ShadedImage::new(transfer, &picture, ShadedLoss::default())?;

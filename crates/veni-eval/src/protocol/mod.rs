@@ -41,7 +41,7 @@ use super::figure::{Plot, Sheet};
 use super::fitting::FitSettings;
 use super::lpips::Lpips;
 use super::store::Store;
-use super::subject::Subject;
+use veni_core::LoadedModel;
 use super::table::Table;
 use crate::Result;
 use veni_data::Dataset;
@@ -78,7 +78,7 @@ pub trait Watch: Sync {
 #[derive(Clone, Copy)]
 pub struct Evaluation<'a> {
     /// The models.
-    pub subjects: &'a [Subject],
+    pub subjects: &'a [LoadedModel],
     /// Rows beside the models' own in reconstruction tables: classical bases of equal D.
     pub others: &'a [&'a dyn Codec],
     /// The panoramas.
@@ -108,7 +108,7 @@ pub struct Report {
 
 impl std::fmt::Debug for Evaluation<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let names: Vec<_> = self.subjects.iter().map(Subject::name).collect();
+        let names: Vec<_> = self.subjects.iter().map(LoadedModel::name).collect();
         f.debug_struct("Evaluation")
             .field("subjects", &names)
             .field("panoramas", &self.data.len())
@@ -119,7 +119,7 @@ impl std::fmt::Debug for Evaluation<'_> {
 
 impl<'a> Evaluation<'a> {
     /// The models' passes that are compared: autoencoder where there is an encoder, and optimised.
-    fn codecs(&self, subject: &'a Subject) -> Vec<Box<dyn Codec + 'a>> {
+    fn codecs(&self, subject: &'a LoadedModel) -> Vec<Box<dyn Codec + 'a>> {
         let fit = FitSettings::thorough(self.data.grid(), self.settings.quick);
         let pass = Autoencoder::new(subject).map(|codec| Box::new(codec) as Box<dyn Codec>);
         pass.into_iter().chain([Box::new(Optimised::new(subject, fit)) as Box<dyn Codec>]).collect()

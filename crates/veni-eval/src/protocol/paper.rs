@@ -32,7 +32,7 @@ pub fn run(run: &Evaluation<'_>, published: &Published) -> Result<Report> {
     if let Some(first) = report.tables.first_mut() {
         first.note("Published numbers are of the articles' test panoramas, not of these.");
     }
-    let mut sizes: Vec<_> = run.subjects.iter().map(super::Subject::training_panoramas).collect();
+    let mut sizes: Vec<_> = run.subjects.iter().map(super::LoadedModel::training_panoramas).collect();
     let all_known = sizes.iter().all(Option::is_some);
     sizes.sort();
     sizes.dedup();

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::subject::Subject;
+use veni_core::LoadedModel;
 use crate::table::{Cell, Column, Table};
 use veni_light::model::ModelKind;
 use crate::{Error, Result};
@@ -42,7 +42,7 @@ impl Published {
 
     /// Together with what the articles say of systems like these, where the file says nothing else.
     #[must_use]
-    pub fn with_article(mut self, subjects: &[Subject]) -> Self {
+    pub fn with_article(mut self, subjects: &[LoadedModel]) -> Self {
         for subject in subjects {
             let known = VENI_LDR_PSNR.iter().find(|(d, _)| *d == subject.dimension());
             let is_veni = subject.kind() == ModelKind::Veni && subject.veni().is_some();

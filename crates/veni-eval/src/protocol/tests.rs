@@ -28,8 +28,8 @@ fn model_of(latent_vectors: usize, seed: u64) -> Model {
     veni.to_model(&config, ModelInfo::default()).unwrap()
 }
 
-fn subject(name: &str, seed: u64) -> Subject {
-    Subject::new(name, model(seed), &Device::flex()).unwrap()
+fn subject(name: &str, seed: u64) -> LoadedModel {
+    LoadedModel::new(name, model(seed), &Device::flex()).unwrap()
 }
 
 /// Skies with a sun each, at exposures of their own.
@@ -63,7 +63,7 @@ impl Watch for Log {
 /// Runs `protocol` in `folder`, and says how many units were computed.
 fn evaluated<T>(
     folder: &Path,
-    subjects: &[Subject],
+    subjects: &[LoadedModel],
     data: &Dataset,
     settings: Settings,
     protocol: impl Fn(&Evaluation<'_>) -> T,
@@ -180,7 +180,7 @@ fn reconstruction_scores_what_it_should() {
 #[test]
 fn decoders_alone_take_part_without_an_encoder() {
     let (folder, data) = (tempfile::tempdir().unwrap(), skies(3));
-    let alone = Subject::new("alone", model(1).without_encoder(), &Device::flex()).unwrap();
+    let alone = LoadedModel::new("alone", model(1).without_encoder(), &Device::flex()).unwrap();
     let both = [subject("whole", 1), alone];
     assert_ne!(both[0].identity(), both[1].identity());
     let (report, _) =
@@ -255,7 +255,7 @@ fn training_set_sizes_come_from_the_files() {
         let mut model = model(seed);
         let training = veni_light::model::Training { data: said.to_owned(), ..Default::default() };
         model.set_info(ModelInfo { training: Some(training), ..ModelInfo::default() });
-        Subject::new(name, model, &Device::flex()).unwrap()
+        LoadedModel::new(name, model, &Device::flex()).unwrap()
     };
     let both = [sized("large", 2, "76 panoramas of hdri"), sized("small", 1, "8 panoramas of hdri")];
     let (report, _) = evaluated(folder.path(), &both, &data, quick(), |run| dataset_size::run(run).unwrap());
@@ -298,7 +298,7 @@ fn the_paper_is_all_of_it() {
 
 #[test]
 fn the_article_stands_beside_models_of_its_sizes() {
-    let sized = |n| Subject::new(format!("N{n}"), model_of(n, 1), &Device::flex()).unwrap();
+    let sized = |n| LoadedModel::new(format!("N{n}"), model_of(n, 1), &Device::flex()).unwrap();
     let known: Published =
         serde_json::from_str(r#"{"reconstruction": {"N9, optimised": {"LDR PSNR (ref.)": 20.5}}}"#).unwrap();
     let expected: Published = serde_json::from_str(
@@ -328,7 +328,7 @@ fn identities_see_the_encoder_too() {
         decoder: DecoderConfig { hidden: 16, layers: 2, heads: 2, ..DecoderConfig::default() },
         encoder: None::<EncoderConfig>,
     };
-    let reni = Subject::new("reni", Model::filler(&config, 3).unwrap(), &Device::flex()).unwrap();
+    let reni = LoadedModel::new("reni", Model::filler(&config, 3).unwrap(), &Device::flex()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let (report, _) =
         evaluated(folder.path(), &[reni], &skies(1), quick(), |run| uniqueness::run(run).unwrap());

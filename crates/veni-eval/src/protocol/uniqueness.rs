@@ -15,7 +15,7 @@ use crate::figure::{Sheet, display, heat};
 use crate::fitting::FitSettings;
 use veni_image::metrics::{log_error, weighted_log_error};
 use crate::store::{Key, digest};
-use crate::subject::Subject;
+use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
 use veni_light::latent::Latent;
 use veni_light::model::ModelKind;
@@ -103,7 +103,7 @@ pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
 }
 
 /// The authors' rates for the two kinds of models.
-fn fit(run: &Evaluation<'_>, subject: &Subject) -> FitSettings {
+fn fit(run: &Evaluation<'_>, subject: &LoadedModel) -> FitSettings {
     let rates = match subject.kind() {
         ModelKind::Veni => [1e-2, 2e-3],
         ModelKind::Reni => [1e-1, 1e-3],
@@ -111,7 +111,7 @@ fn fit(run: &Evaluation<'_>, subject: &Subject) -> FitSettings {
     FitSettings::reference(run.data.grid(), rates, run.settings.quick)
 }
 
-fn pairs<'a>(run: &Evaluation<'a>, subject: &'a Subject) -> Work<'a, Pair> {
+fn pairs<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel) -> Work<'a, Pair> {
     let (grid, items, fit) = (run.data.grid(), run.data.items(), fit(run, subject));
     let seed = run.settings.seed;
     let identities = images(run);
@@ -146,7 +146,7 @@ fn random(n: usize, seed: u64, image: &serde_json::Value, slot: u64) -> Latent {
 
 fn measure(
     run: &Evaluation<'_>,
-    subject: &Subject,
+    subject: &LoadedModel,
     pairs: &[Pair],
     report: &mut Report,
 ) -> Result<Vec<Measured>> {

@@ -9,7 +9,7 @@ use std::path::Path;
 use half::f16;
 use safetensors::tensor::{Dtype, SafeTensors, View};
 
-use super::{Model, Tensor, header};
+use super::{Model, Array, header};
 use crate::output::{Overwrite, write_atomic};
 use crate::{Error, Result};
 
@@ -77,7 +77,7 @@ impl Model {
                     )));
                 }
             };
-            tensors.insert(name.to_owned(), Tensor { shape: view.shape().to_vec(), data });
+            tensors.insert(name.to_owned(), Array { shape: view.shape().to_vec(), data });
         }
         Self::new(config, tensors, info)
     }

@@ -1,6 +1,6 @@
 //! Weights from a formula: for benches, tests and documentation that need a decoder but no asset.
 
-use super::{Conditioning, Model, ModelConfig, ModelInfo, Tensor, decoder_schema};
+use super::{Conditioning, Model, ModelConfig, ModelInfo, Array, decoder_schema};
 use crate::Result;
 
 impl Model {
@@ -17,7 +17,7 @@ impl Model {
         let config = ModelConfig { encoder: None, ..config.clone() };
         let tensors = decoder_schema(&config).into_iter().map(|(name, shape)| {
             let data = fill(&official_key(&name, &config), &shape, seed);
-            (name, Tensor { shape, data })
+            (name, Array { shape, data })
         });
         let tensors = tensors.collect();
         Self::new(config, tensors, ModelInfo::default())

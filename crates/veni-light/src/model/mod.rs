@@ -34,7 +34,7 @@ use crate::{Error, Result};
 
 /// A named tensor's content, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tensor {
+pub struct Array {
     /// Sizes, slowest first; their product is the number of values.
     pub shape: Vec<usize>,
     /// Values; all finite once inside a [`Model`].
@@ -45,7 +45,7 @@ pub struct Tensor {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     config: ModelConfig,
-    tensors: BTreeMap<String, Tensor>,
+    tensors: BTreeMap<String, Array>,
     info: ModelInfo,
 }
 
@@ -56,7 +56,7 @@ impl Model {
     /// [`Error::Invalid`] if a decoder tensor is missing, unexpected or has the wrong shape (both are named),
     /// if an encoder is there that the configuration does not describe, if the prior is malformed, or if a
     /// value is not finite.
-    pub fn new(config: ModelConfig, tensors: BTreeMap<String, Tensor>, info: ModelInfo) -> Result<Self> {
+    pub fn new(config: ModelConfig, tensors: BTreeMap<String, Array>, info: ModelInfo) -> Result<Self> {
         config.validate()?;
         let schema: BTreeMap<_, _> = decoder_schema(&config).into_iter().collect();
         for (name, shape) in &schema {
@@ -111,12 +111,12 @@ impl Model {
     }
 
     /// All tensors by name, in alphabetical order.
-    pub fn tensors(&self) -> &BTreeMap<String, Tensor> {
+    pub fn tensors(&self) -> &BTreeMap<String, Array> {
         &self.tensors
     }
 
     /// One tensor by its full name, e.g. `decoder.output.bias`.
-    pub fn tensor(&self, name: &str) -> Option<&Tensor> {
+    pub fn tensor(&self, name: &str) -> Option<&Array> {
         self.tensors.get(name)
     }
 

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Model, Tensor};
+use super::{Model, Array};
 use crate::latent::Prior;
 use crate::{Error, Result};
 
@@ -17,7 +17,7 @@ fn shapes(n: usize) -> [Vec<usize>; 5] {
 }
 
 /// None of the prior's tensors, or exactly all of them.
-pub(super) fn check(tensors: &BTreeMap<String, Tensor>, n: usize) -> Result<()> {
+pub(super) fn check(tensors: &BTreeMap<String, Array>, n: usize) -> Result<()> {
     let stray = |name: &&String| name.starts_with("prior.") && !NAMES.contains(&name.as_str());
     if let Some(name) = tensors.keys().find(stray) {
         return Err(Error::invalid(format!("tensor {name} is unexpected in a prior")));
@@ -70,7 +70,7 @@ impl Model {
         let Prior { xy_real, xy_imaginary, z, z_mean, log_exposure } = prior.clone();
         let parts = [xy_real, xy_imaginary, z, z_mean, log_exposure.to_vec()];
         for ((name, shape), data) in NAMES.iter().zip(shapes(n)).zip(parts) {
-            self.tensors.insert((*name).to_owned(), Tensor { shape, data });
+            self.tensors.insert((*name).to_owned(), Array { shape, data });
         }
         Ok(())
     }

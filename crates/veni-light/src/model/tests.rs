@@ -27,11 +27,11 @@ fn with_encoder() -> Model {
     let model = small();
     let config = ModelConfig { encoder: Some(EncoderConfig::default()), ..model.config().clone() };
     let mut tensors = model.tensors().clone();
-    tensors.insert("encoder.anything".into(), Tensor { shape: vec![2, 1, 3], data: vec![0.1; 6] });
+    tensors.insert("encoder.anything".into(), Array { shape: vec![2, 1, 3], data: vec![0.1; 6] });
     Model::new(config, tensors, model.info().clone()).unwrap()
 }
 
-fn changed(change: impl FnOnce(&mut ModelConfig, &mut BTreeMap<String, Tensor>)) -> Result<Model> {
+fn changed(change: impl FnOnce(&mut ModelConfig, &mut BTreeMap<String, Array>)) -> Result<Model> {
     let model = small();
     let (mut config, mut tensors) = (model.config().clone(), model.tensors().clone());
     change(&mut config, &mut tensors);
@@ -90,7 +90,7 @@ fn the_hash_names_the_decoder_and_only_it() {
 
 #[test]
 fn wrong_tensors_are_named_with_their_shapes() {
-    type Change = fn(&mut ModelConfig, &mut BTreeMap<String, Tensor>);
+    type Change = fn(&mut ModelConfig, &mut BTreeMap<String, Array>);
     let cases: [(Change, &[&str]); 9] = [
         (|_, t| drop(t.remove("decoder.layers.1.ff2.bias")), &["layers.1.ff2.bias", "[16]", "missing"]),
         (|c, _| c.latent_vectors = 6, &["decoder.input.weight", "[35, 16]", "[40, 16]"]),
@@ -103,11 +103,11 @@ fn wrong_tensors_are_named_with_their_shapes() {
             &["output.bias", "value 2", "NaN"],
         ),
         (
-            |_, t| drop(t.insert("encoder.x".into(), Tensor { shape: vec![1], data: vec![0.0] })),
+            |_, t| drop(t.insert("encoder.x".into(), Array { shape: vec![1], data: vec![0.0] })),
             &["encoder.x", "unexpected"],
         ),
         (
-            |_, t| drop(t.insert("prior.z".into(), Tensor { shape: vec![5, 5], data: vec![0.0; 25] })),
+            |_, t| drop(t.insert("prior.z".into(), Array { shape: vec![5, 5], data: vec![0.0; 25] })),
             &["prior.xy_real", "[5, 5]", "missing"],
         ),
     ];

@@ -98,7 +98,7 @@ fn damaged_state_is_refused_by_name() {
     let message = optimiser.restore(state, 1).unwrap_err().to_string();
     assert!(message.contains("first.a.x"), "{message}");
     let mut state = optimiser.state();
-    state.insert("weight.c".into(), Weight { shape: vec![1], data: vec![0.0] });
+    state.insert("weight.c".into(), Array { shape: vec![1], data: vec![0.0] });
     assert!(optimiser.restore(state, 1).unwrap_err().to_string().contains("weight.c"));
     let orphan = Optimiser::new(&toy(), groups()[..1].to_vec(), 0.9).unwrap_err().to_string();
     assert!(orphan.contains("b.x"), "{orphan}");

@@ -8,7 +8,7 @@ use veni_data::DataConfig;
 use veni_data::coarsen::{averaged, coarse_grid};
 use veni_light::random::{Purpose, stream};
 use veni_image::metrics::Alignment;
-use crate::eval::reconstruction::Reconstruction;
+use veni_data::Reconstruction;
 use crate::fit::{FitTarget, fit};
 use veni_light::latent::{Latent, Prior};
 use veni_light::model::{Model, ModelInfo, Training};

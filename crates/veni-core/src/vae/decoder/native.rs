@@ -11,15 +11,14 @@ use std::collections::BTreeMap;
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::{Decoder, Layers, invariants};
-use veni_light::field::bfloat16::Bfloat16;
-use veni_light::field::gradient::perceptron::{Image, Perceptron};
+use veni_light::field::training::{Bfloat16, Conditioned, Perceptron};
 use crate::{Error, Result};
 
 /// A decoder with the latents of a batch, on the processor.
 #[derive(Debug)]
 pub struct Native {
     perceptron: Perceptron,
-    images: Vec<Image>,
+    images: Vec<Conditioned>,
     latent: Tensor<3>,
     /// What is added before the first layer and after each, `[B, h]` each.
     added: Vec<Tensor<2>>,
@@ -83,7 +82,7 @@ impl Decoder {
         let images = (latents.as_chunks::<3>().0.chunks_exact(n).enumerate()).map(|(b, vectors)| {
             let row = |all: &'_ Vec<f32>| all[b * self.config.hidden..][..self.config.hidden].to_vec();
             let rows: Vec<Vec<f32>> = numbers.iter().map(row).collect();
-            perceptron.image(vectors, &rows.iter().map(Vec::as_slice).collect::<Vec<_>>())
+            perceptron.conditioned(vectors, &rows.iter().map(Vec::as_slice).collect::<Vec<_>>())
         });
         let images = images.collect();
         Ok(Native { perceptron, images, latent, added, matrices, vectors })

@@ -67,7 +67,7 @@ impl Perceptron {
     ///
     /// # Panics
     /// If there are not 1 + layers of h.
-    pub fn image(&self, vectors: &[[f32; 3]], added: &[&[f32]]) -> Conditioned {
+    pub fn conditioned(&self, vectors: &[[f32; 3]], added: &[&[f32]]) -> Conditioned {
         let (hidden, layers, padded) = (self.mlp.hidden, self.mlp.layers.len(), self.mlp.padded());
         let fits = added.len() == 1 + layers && added.iter().all(|a| a.len() == hidden);
         assert!(fits, "{layers} layers of {hidden} take {} vectors of {hidden}", 1 + layers);

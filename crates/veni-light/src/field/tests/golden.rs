@@ -11,12 +11,12 @@ use serde_json::Value;
 use super::distance;
 use crate::latent::Latent;
 use crate::model::{
-    DecoderConfig, Model, ModelConfig, ModelInfo, ModelKind, Tensor, VnReluForm, decoder_schema,
+    DecoderConfig, Model, ModelConfig, ModelInfo, ModelKind, Array, VnReluForm, decoder_schema,
 };
 
 struct Case {
     name: String,
-    tensors: BTreeMap<String, Tensor>,
+    tensors: BTreeMap<String, Array>,
     config: Value,
     tolerances: Value,
 }
@@ -35,7 +35,7 @@ impl Case {
         let floats = file.iter().filter(|(_, view)| view.dtype() == safetensors::Dtype::F32);
         let tensors = floats.map(|(key, view)| {
             let data = view.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-            (key.to_owned(), Tensor { shape: view.shape().to_vec(), data })
+            (key.to_owned(), Array { shape: view.shape().to_vec(), data })
         });
         Self { name: name.into(), tensors: tensors.collect(), config, tolerances }
     }
@@ -99,14 +99,14 @@ impl Case {
             }
         };
         let tensors = decoder_schema(&config).into_iter().map(|(name, shape)| {
-            let Tensor { data, .. } = &self.tensors[&theirs(&name)];
+            let Array { data, .. } = &self.tensors[&theirs(&name)];
             let data = match shape[..] {
                 [inputs, outputs] => {
                     (0..data.len()).map(|i| data[(i % outputs) * inputs + i / outputs]).collect()
                 }
                 _ => data.clone(),
             };
-            (name, Tensor { shape, data })
+            (name, Array { shape, data })
         });
         Model::new(config, tensors.collect(), ModelInfo::default()).unwrap()
     }

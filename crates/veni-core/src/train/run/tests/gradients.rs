@@ -127,7 +127,7 @@ fn distance(a: &Computed, b: &Computed) -> f64 {
     let norm =
         |values: &mut dyn Iterator<Item = f32>| values.map(|v| f64::from(v).powi(2)).sum::<f64>().sqrt();
     let largest = norm(&mut b.gradients.values().flat_map(|g| g.data.iter().copied()));
-    let one = |(name, g): (&String, &weights::Weight)| {
+    let one = |(name, g): (&String, &veni_light::model::Array)| {
         let other = &b.gradients[name];
         let difference = norm(&mut g.data.iter().zip(&other.data).map(|(x, y)| x - y));
         // parameters whose gradient is rounding alone are measured by the whole

@@ -38,7 +38,7 @@ fn slope(i: usize) -> f32 {
 }
 
 fn with_latent(mut gradients: weights::Weights, latent: &Tensor<3>) -> weights::Weights {
-    let latent = weights::Weight { shape: latent.dims().to_vec(), data: values(latent) };
+    let latent = veni_light::model::Array { shape: latent.dims().to_vec(), data: values(latent) };
     gradients.insert("latent".into(), latent);
     gradients
 }

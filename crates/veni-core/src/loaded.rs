@@ -1,22 +1,22 @@
-//! A model under evaluation.
+//! A model file with its networks, ready to encode, decode and be fitted to.
 
 use std::sync::Arc;
 
 use burn::tensor::Device;
 
 use veni_light::field;
-use veni_core::fit::FitDecoder;
+use crate::fit::FitDecoder;
 use veni_light::latent::{Latent, Prior};
 use veni_light::model::{Model, ModelKind};
 use veni_light::sphere::{Equirect, Stripes};
-use veni_core::vae::weights::{self, Weight};
-use veni_core::vae::{Decoder, Veni, veni};
+use crate::vae::weights;
+use crate::vae::{Decoder, Veni, veni};
 use crate::{Error, Result};
 
 /// A model and everything that the protocols ask of it. A model without an encoder (RENI++, or a stripped file) takes part
 /// wherever no encoder is needed.
 #[derive(Clone, Debug)]
-pub struct Subject {
+pub struct LoadedModel {
     name: String,
     identity: String,
     model: Arc<Model>,
@@ -33,7 +33,7 @@ enum Decoding {
     Alone { network: Box<Decoder>, field: Option<field::Decoder> },
 }
 
-impl Subject {
+impl LoadedModel {
     /// A model under a name for tables, with its networks on `device` (without gradient tracking).
     ///
     /// # Errors
@@ -147,7 +147,7 @@ impl Subject {
     /// Log radiance at the latents' exposures on every pixel, 3·W·H values each.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the model if a latent is none of its own or too large to decode.
+    /// [`Error::Invalid`] naming the model if a latent does not belong to it or is too large to decode.
     pub fn decode(&self, grid: Equirect, latents: &[Latent]) -> Result<Vec<Vec<f32>>> {
         let Some(field) = self.field() else {
             let vectors: Vec<_> = latents.iter().map(|z| z.vectors.clone()).collect();
@@ -189,7 +189,5 @@ fn decoder_alone(model: &Model, device: &Device) -> Result<Decoder> {
     let mut rng: rand_chacha::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
     let decoder = Decoder::new(&model.config().decoder, model.latent_vectors(), &mut rng, device);
     let tensors = model.tensors().iter().filter(|(name, _)| name.starts_with("decoder."));
-    let weights =
-        tensors.map(|(name, t)| (name.clone(), Weight { shape: t.shape.clone(), data: t.data.clone() }));
-    weights::write(decoder, "decoder", &weights.collect())
+    weights::write(decoder, "decoder", &tensors.map(|(name, t)| (name.clone(), t.clone())).collect())
 }

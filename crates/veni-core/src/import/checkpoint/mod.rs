@@ -21,7 +21,7 @@ use std::path::Path;
 use half::{bf16, f16};
 use safetensors::tensor::{Dtype, SafeTensors};
 
-use veni_core::vae::weights::Weight;
+use veni_light::model::Array;
 use crate::{Error, Result};
 
 /// Largest file that is read: checkpoints with optimiser states are large, a wrong path must not fill the memory.
@@ -63,7 +63,7 @@ impl Element {
 
 /// The tensors of one file, by dotted path.
 #[derive(Debug)]
-pub(super) struct Checkpoint {
+pub struct Checkpoint {
     file: Vec<u8>,
     views: BTreeMap<String, View>,
 }
@@ -74,7 +74,7 @@ impl Checkpoint {
     /// # Errors
     /// [`Error::Io`] if it cannot be read; [`Error::Invalid`] and [`Error::Unsupported`] by name if it is none of the
     /// formats, or damaged.
-    pub(super) fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
         let mut bytes = Vec::new();
         file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
@@ -97,7 +97,7 @@ impl Checkpoint {
     }
 
     /// The names of all tensors.
-    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+    pub fn names(&self) -> impl Iterator<Item = &str> {
         self.views.keys().map(String::as_str)
     }
 
@@ -106,7 +106,7 @@ impl Checkpoint {
     /// # Errors
     /// [`Error::Invalid`] if it is absent, reaches outside of its storage or is not finite; [`Error::Unsupported`] if
     /// it does not hold floating-point numbers.
-    pub(super) fn tensor(&self, name: &str) -> Result<Weight> {
+    pub fn tensor(&self, name: &str) -> Result<Array> {
         let view =
             self.views.get(name).ok_or_else(|| Error::invalid(format!("there is no tensor {name}")))?;
         let View { element, shape, strides, .. } = view;
@@ -137,7 +137,7 @@ impl Checkpoint {
         }
         match data.iter().position(|v| !v.is_finite()) {
             Some(at) => Err(Error::invalid(format!("tensor {name}: value {at} is {}", data[at]))),
-            None => Ok(Weight { shape: shape.clone(), data }),
+            None => Ok(Array { shape: shape.clone(), data }),
         }
     }
 }

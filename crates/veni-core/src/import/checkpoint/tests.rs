@@ -125,8 +125,8 @@ fn check(file: Vec<u8>) {
     let checkpoint = Checkpoint::from_bytes(file).unwrap();
     assert_eq!(checkpoint.names().collect::<Vec<_>>(), ["a.turned", "a.weight", "b", "count"]);
     let tensor = |name| checkpoint.tensor(name).unwrap();
-    assert_eq!(tensor("a.weight"), Weight { shape: vec![2, 3], data: vec![0.5, 1.5, 2.5, 3.5, 4.5, 5.5] });
-    assert_eq!(tensor("a.turned"), Weight { shape: vec![2, 2], data: vec![1.5, 4.5, 2.5, 5.5] });
+    assert_eq!(tensor("a.weight"), Array { shape: vec![2, 3], data: vec![0.5, 1.5, 2.5, 3.5, 4.5, 5.5] });
+    assert_eq!(tensor("a.turned"), Array { shape: vec![2, 2], data: vec![1.5, 4.5, 2.5, 5.5] });
     assert_eq!(tensor("b").data, [1.5, -2.0]);
     assert!(checkpoint.tensor("count").unwrap_err().to_string().contains("integers"));
     assert!(checkpoint.tensor("c").unwrap_err().to_string().contains("no tensor c"));

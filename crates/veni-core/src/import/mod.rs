@@ -1,0 +1,5 @@
+//! Weights of other programs.
+
+mod checkpoint;
+
+pub use checkpoint::Checkpoint;
