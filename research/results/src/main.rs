@@ -126,12 +126,36 @@ mod tests {
         assert_eq!(stale(&folder(), &pages).unwrap(), Vec::<String>::new());
     }
 
+    /// Numbers with a point in the tables of the summary.
+    fn decimals(text: &str) -> Vec<&str> {
+        let rows = text.lines().filter(|line| line.starts_with('|'));
+        let words = rows.flat_map(|row| row.split(|c: char| !(c.is_ascii_digit() || c == '.')));
+        words.filter(|word| word.contains('.') && word.bytes().any(|b| b.is_ascii_digit())).collect()
+    }
+
     #[test]
-    fn a_changed_cell_a_missing_page_and_a_foreign_page_are_found() {
+    fn the_summary_cites_recorded_numbers_only() {
+        let summary = std::fs::read_to_string(folder().join("../RESULTS.md")).unwrap();
+        let recorded = pages(&folder()).unwrap().into_values().collect::<String>();
+        let cited = decimals(&summary);
+        assert!(cited.len() > 100, "{} numbers found in docs/RESULTS.md", cited.len());
+        let recorded = |word: &str| {
+            recorded.match_indices(word).any(|(at, _)| {
+                let digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit() || c == '.');
+                !digit(recorded[..at].chars().next_back())
+                    && !recorded[at + word.len()..].starts_with(|c: char| c.is_ascii_digit())
+            })
+        };
+        let foreign: Vec<_> = cited.into_iter().filter(|word| !recorded(word)).collect();
+        assert_eq!(foreign, Vec::<&str>::new(), "in docs/RESULTS.md, but on no page of docs/results");
+    }
+
+    #[test]
+    fn a_changed_page_a_missing_page_and_a_foreign_page_are_found() {
         let mut pages = pages(&folder()).unwrap();
         let (first, last) = (pages.keys().next().unwrap().clone(), pages.keys().next_back().unwrap().clone());
         let text = pages.get_mut(&first).unwrap();
-        *text = text.replacen("| ", "| 1", 1);
+        *text = text.replacen("# ", "## ", 1);
         pages.remove(&last);
         pages.insert("zz.md".to_owned(), String::new());
         assert_eq!(stale(&folder(), &pages).unwrap(), [first, last, "zz.md".to_owned()]);
