@@ -1,4 +1,4 @@
-//! How a rendering is compared with a photograph, pixel by pixel.
+//! How a rendering is compared with a photograph, pixel by pixel. MODEL (56).
 
 use super::Transfer;
 use super::transfer::check_image;
