@@ -2,7 +2,8 @@
 //!
 //! ```sh
 //! cargo run --release -p veni-results                  # writes docs/results/*.md
-//! cargo run --release -p veni-results -- --check       # exit 1 and the file's name where a page is not up to date
+//! cargo run --release -p veni-results -- --check       # exit 1 and a line for each page that is not up to date, each link
+//!                                                      # that leads nowhere and each head that lacks its equation's number
 //! cargo run --release -p veni-results -- add tables/reconstruction.json --topic reconstruction --command "veni-cli …"
 //! ```
 
@@ -12,6 +13,7 @@
 mod add;
 mod data;
 mod date;
+mod links;
 mod page;
 mod wrap;
 
@@ -61,7 +63,11 @@ fn run(words: &[String]) -> Result<ExitCode> {
             for name in &stale {
                 println!("docs/results/{name} differs: run `cargo run --release -p veni-results`");
             }
-            Ok(if stale.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+            let broken = links::broken(&folder.join("../.."))?;
+            for line in &broken {
+                println!("{line}");
+            }
+            Ok(if stale.is_empty() && broken.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
         }
         Some("add") => {
             words.remove(0);

@@ -92,7 +92,7 @@ fn shown(cell: &Cell) -> String {
 }
 
 /// The anchor that Markdown viewers give a heading: lower case, words joined by hyphens, punctuation left out.
-fn anchor(title: &str) -> String {
+pub(crate) fn anchor(title: &str) -> String {
     title
         .to_lowercase()
         .chars()
