@@ -1,4 +1,4 @@
-//! Exposure 0: the solid-angle-weighted mean of ln(luminance) is 0.
+//! Exposure 0: the solid-angle-weighted mean of ln(luminance) is 0. MODEL (3).
 
 use veni_image::LUMINANCE;
 use veni_light::sphere::Equirect;

@@ -1,4 +1,4 @@
-//! What is minimised, and how.
+//! What is minimised, and how. MODEL (37).
 
 use serde::{Deserialize, Serialize};
 

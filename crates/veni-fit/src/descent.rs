@@ -1,4 +1,4 @@
-//! The ways down: Adam on everything at once, Levenberg–Marquardt image by image.
+//! The ways down: Adam on everything at once, Levenberg–Marquardt image by image. MODEL (37).
 
 use super::FitResult;
 use super::adam::Variable;

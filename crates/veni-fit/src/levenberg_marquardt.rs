@@ -1,5 +1,5 @@
 //! The method of Levenberg and Marquardt on one latent: Gauss–Newton steps, held back as far as their model of the loss
-//! proves wrong.
+//! proves wrong. MODEL (42).
 //!
 //! A step δ solves (H + λ D) δ = −g with H and g of the [normal equations](veni_light::field::NormalEquations) and D the
 //! diagonal of H. It is taken if the loss falls; λ follows the ratio of the fall to the one that was promised, by

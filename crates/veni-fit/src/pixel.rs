@@ -1,4 +1,4 @@
-//! Losses that look at each pixel alone, with their derivatives, in f64.
+//! Losses that look at each pixel alone, with their derivatives, in f64. MODEL (43–47).
 
 use super::config::Objective;
 use super::target::FitTarget;

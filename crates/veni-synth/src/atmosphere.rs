@@ -1,4 +1,4 @@
-//! Air: molecules, aerosol and ozone around a spherical earth, and the light they scatter.
+//! Air: molecules, aerosol and ozone around a spherical earth, and the light they scatter. MODEL (65, 66).
 //!
 //! Densities and phase functions as in Bruneton & Neyret (EGSR 2008); light scattered more than once by the isotropic
 //! closed form of Hillaire (EGSR 2020); aerosol from turbidity T by Ångström's law with the coefficient of Preetham,

@@ -1,4 +1,4 @@
-//! Decks of cloud: fractal density on a spherical shell above the viewer, lit by sun, sky and ground.
+//! Decks of cloud: fractal density on a spherical shell above the viewer, lit by sun, sky and ground. MODEL (67).
 //!
 //! A **heap** (cumulus, stratocumulus) has a flat base and tops that rise where the cloud is dense; rays march through
 //! it and towards the sun. A **sheet** (cirrus, altocumulus, altostratus, stratus) is thin enough to be a surface of

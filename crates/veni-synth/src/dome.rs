@@ -1,4 +1,4 @@
-//! The clear sky around one source of light, as a table over elevation and azimuth from it.
+//! The clear sky around one source of light, as a table over elevation and azimuth from it. MODEL (66).
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! The ground plane: which surface lies where, its texture, and water.
+//! The ground plane: which surface lies where, its texture, and water. MODEL (70).
 
 use glam::{Vec2, Vec3};
 

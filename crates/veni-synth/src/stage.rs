@@ -1,4 +1,4 @@
-//! A scene built up: what a ray from the eye sees.
+//! A scene built up: what a ray from the eye sees. MODEL (69).
 
 mod below;
 

@@ -1,4 +1,4 @@
-//! Multi-head self-attention among tokens of vectors.
+//! Multi-head self-attention among tokens of vectors. MODEL (9).
 
 use super::norm::COORDINATE;
 use super::{VectorLinear, VectorLinearConfig};

@@ -1,4 +1,4 @@
-//! The feed-forward block: expand, ReLU, contract.
+//! The feed-forward block: expand, ReLU, contract. MODEL (10).
 
 use super::so2_linear::So2Feature;
 use super::vn_linear::matmul_channels;

@@ -1,4 +1,4 @@
-//! The SO(2) fully connected layer: equivariant and invariant coordinates feed each other.
+//! The SO(2) fully connected layer: equivariant and invariant coordinates feed each other. MODEL (7, 8).
 
 use super::init::uniform;
 use super::norm::{COORDINATE, coordinate_norm};

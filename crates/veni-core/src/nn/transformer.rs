@@ -1,4 +1,4 @@
-//! The transformer encoder of vector features.
+//! The transformer encoder of vector features. MODEL (11).
 
 use super::{
     GateWeights, VectorAttention, VectorAttentionConfig, VectorFeedForward, VectorFeedForwardConfig,

@@ -1,4 +1,4 @@
-//! From vectors to numbers that no rotation changes.
+//! From vectors to numbers that no rotation changes. MODEL (17).
 
 use super::norm::COORDINATE;
 use super::{VnLinear, VnLinearConfig, VnRelu, VnReluConfig};

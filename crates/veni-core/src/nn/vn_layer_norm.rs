@@ -1,4 +1,4 @@
-//! Layer norm of a vector feature: lengths are normalised over channels, directions are kept.
+//! Layer norm of a vector feature: lengths are normalised over channels, directions are kept. MODEL (6).
 
 use super::norm::coordinate_norm;
 use burn::module::{Module, Param};

@@ -1,4 +1,4 @@
-//! The Vector-Neuron linear layer.
+//! The Vector-Neuron linear layer. MODEL (4).
 
 use super::init::uniform;
 use burn::module::{Module, Param};

@@ -1,4 +1,4 @@
-//! The Vector-Neuron ReLU: a vector that points away from a learned direction loses its part along it.
+//! The Vector-Neuron ReLU: a vector that points away from a learned direction loses its part along it. MODEL (5).
 
 use super::init::uniform;
 use super::norm::{COORDINATE, squared_coordinate_norm};

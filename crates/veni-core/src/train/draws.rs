@@ -1,4 +1,4 @@
-//! Which panoramas a batch takes.
+//! Which panoramas a batch takes. MODEL (33).
 
 use std::sync::{Mutex, PoisonError};
 

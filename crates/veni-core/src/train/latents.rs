@@ -1,4 +1,4 @@
-//! The latent table of an auto-decoder: how it is trained, and its file.
+//! The latent table of an auto-decoder: how it is trained, and its file. MODEL (25).
 
 use std::collections::HashMap;
 use std::io::Write;

@@ -1,4 +1,4 @@
-//! The network on each device of a run: all compute a part of every batch, at the same time.
+//! The network on each device of a run: all compute a part of every batch, at the same time. MODEL (34).
 //!
 //! The losses are means over panoramas, so the gradient of a batch is the mean of its parts' gradients, each weighted by
 //! its panoramas. Gradients come to the host, where the optimiser is, and are added in the order of the devices, not in

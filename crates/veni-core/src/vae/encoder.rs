@@ -1,4 +1,4 @@
-//! VN-ViT, the rotation-equivariant encoder: a panorama seen as vertical stripes, one token each.
+//! VN-ViT, the rotation-equivariant encoder: a panorama seen as vertical stripes, one token each. MODEL (13, 14).
 
 use super::Posterior;
 use veni_light::model::{EncoderConfig, Pooling, Reduction, VectorLayer};

@@ -1,4 +1,4 @@
-//! What the encoder says about a panorama: a Gaussian over latents.
+//! What the encoder says about a panorama: a Gaussian over latents. MODEL (15).
 
 use burn::tensor::Tensor;
 

@@ -1,4 +1,4 @@
-//! The auto-decoder RENI++: a decoder, and a latent for every training panorama.
+//! The auto-decoder RENI++: a decoder, and a latent for every training panorama. MODEL (25).
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Int, Tensor};

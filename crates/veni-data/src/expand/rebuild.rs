@@ -1,4 +1,4 @@
-//! Radiance for what is clipped: the expand map, then the sun.
+//! Radiance for what is clipped: the expand map, then the sun. MODEL (62).
 
 use super::{Analysis, Parameters, Region, SUN_RADIUS, Sun};
 use veni_image::{Panorama, luminance};

@@ -1,5 +1,5 @@
 //! Linear least squares by normal equations: G x = b with the Gram matrix G = Σ ω f fᵀ of the basis functions
-//! f on the pixels that there are. Nothing is assumed to be orthonormal.
+//! f on the pixels that there are. Nothing is assumed to be orthonormal. MODEL (48, 50).
 
 use veni_light::cholesky;
 

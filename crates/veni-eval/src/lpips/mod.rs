@@ -1,4 +1,5 @@
 //! LPIPS with AlexNet (Zhang et al. 2018, "The unreasonable effectiveness of deep features as a perceptual metric").
+//! MODEL (61).
 //!
 //! d(a, b) = Σ_l 1/(H_l W_l) Σ_hw Σ_c w_lc (â_lhwc − b̂_lhwc)²: â_l are the activations after the l-th rectifier, divided per
 //! pixel by their length over channels; w_l are learned weights (the "heads"). Images are display values in [0, 1]; the

@@ -45,7 +45,7 @@ impl Lights {
     }
 
     /// The authors' lights: one per pixel of a panorama, row-major, each with weight 1 whatever its solid angle
-    /// (REFERENCE §11), in their camera frame ([`reference::decoder_directions`]).
+    /// (MODEL, Rendered images), in their camera frame ([`reference::decoder_directions`]).
     pub fn reference(grid: Equirect) -> Self {
         Self { directions: reference::decoder_directions(grid), solid_angles: vec![1.0; grid.len()] }
     }

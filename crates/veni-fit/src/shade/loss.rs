@@ -1,4 +1,4 @@
-//! How a rendering is compared with a photograph, pixel by pixel.
+//! How a rendering is compared with a photograph, pixel by pixel. MODEL (56).
 
 use super::Transfer;
 use super::transfer::check_image;
@@ -18,7 +18,7 @@ pub enum ShadedLoss {
         /// ε over the mean of the target.
         floor: f32,
     },
-    /// The authors' figure (REFERENCE §11): 100 mean |ln R − ln T| over all pixels, where those that show nothing are
+    /// The authors' figure (MODEL, Rendered images): 100 mean |ln R − ln T| over all pixels, where those that show nothing are
     /// equal.
     ReferenceLog,
     /// RENI++'s demonstration: `mse` mean (g(R) − g(T))² + `cosine` (1 − mean cos(g(R), g(T))) over all pixels, with g(x) the

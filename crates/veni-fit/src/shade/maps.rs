@@ -7,7 +7,7 @@ use veni_image::tonemap::srgb_to_linear;
 use veni_image::{Panorama, ReadOptions};
 use crate::{Error, Result};
 
-/// A normal counts if its length lies strictly between these (REFERENCE §11).
+/// A normal counts if its length lies strictly between these (MODEL, Rendered images).
 const LENGTHS: [f64; 2] = [0.5, 1.5];
 
 /// An image of normals, row-major, row 0 on top; (0, 0, 0) where nothing is seen.

@@ -1,4 +1,4 @@
-//! How a surface reflects: Lambert's law, and Blinn-Phong's lobe.
+//! How a surface reflects: Lambert's law, and Blinn-Phong's lobe. MODEL (55, 57).
 
 use std::f64::consts::{FRAC_1_PI, PI};
 

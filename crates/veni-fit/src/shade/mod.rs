@@ -55,7 +55,7 @@ pub enum ShadingForm {
     /// surface are 0.
     #[default]
     Physical,
-    /// REFERENCE §11: the sum over the lights uses no 1/π; the view vector of Blinn-Phong points *away* from the camera,
+    /// MODEL (57): the sum over the lights uses no 1/π; the view vector of Blinn-Phong points *away* from the camera,
     /// its lobe has no cosine and the factor (s + 2)/(4 (2 − e^{−s/2})); its result is at least 1e-3; pixels that
     /// show no surface are 1. Lights of [`Lights::reference`] belong to it, which have no solid angles either.
     Reference,

@@ -1,4 +1,4 @@
-//! The linear map from the light to the image, row by row.
+//! The linear map from the light to the image, row by row. MODEL (54).
 
 use std::collections::HashMap;
 use std::sync::Arc;

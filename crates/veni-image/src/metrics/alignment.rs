@@ -1,4 +1,4 @@
-//! What is allowed to be fitted to the target before images are compared.
+//! What is allowed to be fitted to the target before images are compared. MODEL (58, 59).
 
 /// What the prediction may be adjusted by before it is scored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! Peak signal-to-noise ratio.
+//! Peak signal-to-noise ratio. MODEL (60).
 
 /// 20 log₁₀(range) − 10 log₁₀(MSE) in dB, range = max(target, 0) − min(target, 0). Infinite where the two
 /// are equal.

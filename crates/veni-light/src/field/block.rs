@@ -1,4 +1,4 @@
-//! The network for a block of directions at a time.
+//! The network for a block of directions at a time. MODEL (16, 18–20).
 //!
 //! A block is three vectors of lanes, one direction per lane. Activations are feature-major: one [`Row`] (three
 //! vectors) per feature, so that layer norm, encoding and ReLU are plain vector code, and a weight is one

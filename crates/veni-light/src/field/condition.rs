@@ -1,4 +1,4 @@
-//! From a latent to the vectors that the layers add.
+//! From a latent to the vectors that the layers add. MODEL (17).
 //!
 //! The attention has one key, so its softmax is 1 and it returns out(value(c)) whatever the direction, where
 //! c = (a₁₁, a₁₂, z₁, …, a_N1, a_N2, z_N) are the latent's invariants. One h-vector per layer is all that is

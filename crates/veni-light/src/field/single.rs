@@ -1,4 +1,4 @@
-//! The network for one direction: lanes run over outputs instead of directions.
+//! The network for one direction: lanes run over outputs instead of directions. MODEL (18–20).
 //!
 //! It reads the weights once, at the speed of the second-level cache, where a block of one would do all the
 //! work of a full block. Every sum is taken in the order of `block`, so the bits are the same.

@@ -1,4 +1,4 @@
-//! How likely a code is under a prior.
+//! How likely a code is under a prior. MODEL (36).
 
 use super::Prior;
 

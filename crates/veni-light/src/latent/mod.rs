@@ -1,4 +1,4 @@
-//! The latent code: N vectors in R³ that turn with the scene, and an exposure.
+//! The latent code: N vectors in R³ that turn with the scene, and an exposure. MODEL (2).
 //!
 //! Turning a panorama by α about z turns every vector by α about z; the x and y of a vector form its
 //! equivariant part, z its invariant part. The paper's dimension is D = 3N.

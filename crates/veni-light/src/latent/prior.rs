@@ -1,4 +1,4 @@
-//! A Gaussian over latent codes that does not prefer a compass direction.
+//! A Gaussian over latent codes that does not prefer a compass direction. MODEL (35).
 //!
 //! With c = x + iy for the N vectors, a distribution that is invariant under turning about z has E c = 0,
 //! E c cᵀ = 0 and no correlation between c and z. What remains is the Hermitian covariance C = E c cᴴ (how

@@ -1,4 +1,4 @@
-//! The equirectangular (latitude–longitude) pixel grid.
+//! The equirectangular (latitude–longitude) pixel grid. MODEL (1).
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Where the encoder looks: stripes of meridians, equal-area heights.
+//! Where the encoder looks: stripes of meridians, equal-area heights. MODEL (12).
 
 use std::f64::consts::PI;
 

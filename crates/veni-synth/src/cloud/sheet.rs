@@ -1,4 +1,4 @@
-//! Rays through decks without height.
+//! Rays through decks without height. MODEL (68).
 
 use std::f32::consts::PI;
 

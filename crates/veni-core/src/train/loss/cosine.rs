@@ -1,4 +1,4 @@
-//! Colour direction: one minus the cosine between predicted and true RGB.
+//! Colour direction: one minus the cosine between predicted and true RGB. MODEL (28).
 
 use burn::tensor::Tensor;
 

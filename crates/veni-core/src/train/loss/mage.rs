@@ -1,4 +1,4 @@
-//! MAGE: the multi-scale mean absolute gradient error of log radiance.
+//! MAGE: the multi-scale mean absolute gradient error of log radiance. MODEL (29).
 
 use super::LossForm;
 use super::rows;

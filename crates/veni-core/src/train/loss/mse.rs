@@ -1,4 +1,4 @@
-//! Mean squared errors in three spaces, with an optional mask.
+//! Mean squared errors in three spaces, with an optional mask. MODEL (31).
 
 use super::LossForm;
 use burn::tensor::Tensor;

@@ -1,5 +1,5 @@
 //! 3 × 3 stencils on image planes as products with small constant matrices, so that forward and backward
-//! are a few matrix products and no padding, shifting or copying.
+//! are a few matrix products and no padding, shifting or copying. MODEL (29).
 
 use burn::tensor::{Device, Tensor, TensorData};
 

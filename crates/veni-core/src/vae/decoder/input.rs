@@ -1,4 +1,4 @@
-//! The directional input: products of latent and direction, encoded by sines.
+//! The directional input: products of latent and direction, encoded by sines. MODEL (16).
 
 use veni_light::model::Equivariance;
 use burn::tensor::{Tensor, TensorData};

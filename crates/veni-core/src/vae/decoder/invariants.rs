@@ -1,4 +1,4 @@
-//! What the network is told about the latent apart from its products with the direction.
+//! What the network is told about the latent apart from its products with the direction. MODEL (17).
 
 use super::Condition;
 use super::input::encode;

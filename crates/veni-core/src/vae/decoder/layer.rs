@@ -1,4 +1,4 @@
-//! The residual layers.
+//! The residual layers. MODEL (19).
 
 use super::linear::Linear;
 use burn::module::{Module, Param};

@@ -1,5 +1,5 @@
 //! The decoder: a neural field on the sphere conditioned on a latent, equivariant under SO(2) about z
-//! and under reflections that keep z.
+//! and under reflections that keep z. MODEL (18).
 //!
 //! It is the RENI++ network with attention conditioning and Vector-Neuron invariance, folded: the
 //! attention of the original has a single key, so what it adds is one vector per image and layer (see

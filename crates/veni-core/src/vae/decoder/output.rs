@@ -1,4 +1,4 @@
-//! From the output map to log radiance.
+//! From the output map to log radiance. MODEL (20, 24).
 
 use veni_light::model::{DecoderConfig, OutputForm};
 use burn::tensor::Tensor;

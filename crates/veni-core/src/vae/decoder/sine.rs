@@ -1,4 +1,4 @@
-//! Networks of sines: SIREN (concat conditioning) and its modulated form (FiLM).
+//! Networks of sines: SIREN (concat conditioning) and its modulated form (FiLM). MODEL (21, 22).
 
 use super::Linear;
 use veni_light::model::DecoderConfig;

@@ -1,4 +1,4 @@
-//! Attention over the latent vectors: each is a token, and a ray asks for what it needs.
+//! Attention over the latent vectors: each is a token, and a ray asks for what it needs. MODEL (23).
 //!
 //! RENI++'s decoder has one key per ray and therefore no attention. Here the keys and values are those of the N latent
 //! vectors, made from their invariants: they do not depend on the ray and are computed once per latent. Queries are

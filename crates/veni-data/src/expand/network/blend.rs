@@ -1,4 +1,4 @@
-//! Where a network's radiance is used: what is clipped, and nowhere else.
+//! Where a network's radiance is used: what is clipped, and nowhere else. MODEL (63).
 
 use super::super::CLIPPED;
 use super::{Estimate, KEPT, NetworkScale};

@@ -1,4 +1,4 @@
-//! Running a network on a sphere: without edges where its image would have them.
+//! Running a network on a sphere: without edges where its image would have them. MODEL (64).
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Spherical Gaussians as the authors' baseline computes them, for their numbers only.
+//! Spherical Gaussians as the authors' baseline computes them, for their numbers only. MODEL (53).
 //!
 //! The lobes sit on a grid of the *upper* hemisphere and may move by one and a half cells. Their option
 //! `row_col_gaussian_dims` is unpacked as (columns, rows). Directions are of the camera frame

@@ -1,5 +1,5 @@
 //! Amplitudes and constant enter an expansion linearly: for given axes and sharpnesses the best ones are known. Only the
-//! shapes are searched (variable projection; Golub & Pereyra 1973).
+//! shapes are searched (variable projection; Golub & Pereyra 1973). MODEL (48).
 
 use super::descent::Problem;
 use super::{Gaussians, Lobe, shape};

@@ -1,4 +1,4 @@
-//! Axes and sharpnesses as free numbers, and what a loss says about them.
+//! Axes and sharpnesses as free numbers, and what a loss says about them. MODEL (51, 52).
 
 use super::dot;
 

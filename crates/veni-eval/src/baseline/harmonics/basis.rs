@@ -1,4 +1,4 @@
-//! The real orthonormal spherical-harmonics basis.
+//! The real orthonormal spherical-harmonics basis. MODEL (49).
 
 use std::f64::consts::{PI, SQRT_2};
 

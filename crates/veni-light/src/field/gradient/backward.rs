@@ -1,4 +1,4 @@
-//! One task: its directions in blocks, each forward with its activations kept, then backward.
+//! One task: its directions in blocks, each forward with its activations kept, then backward. MODEL (39).
 
 use pulp::{Simd, WithSimd};
 

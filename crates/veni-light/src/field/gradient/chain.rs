@@ -1,4 +1,4 @@
-//! From the folded latent back to the latent: the attention's linear maps and the invariants, once.
+//! From the folded latent back to the latent: the attention's linear maps and the invariants, once. MODEL (39, 40).
 
 use super::Gradient;
 use super::backward::Sums;

@@ -1,5 +1,5 @@
 //! The normal equations of Gauss and Newton: how a loss on log radiance curves with the latent, seen through the
-//! decoder's own derivatives.
+//! decoder's own derivatives. MODEL (41).
 //!
 //! Every direction goes forward once and backward three times, once for each colour. That leaves the rows of the
 //! Jacobian J = ∂(log radiance)/∂(latent) lane by lane, and their products Jᵀ diag(ℓ″) J and Jᵀ ℓ′ are summed
