@@ -3,9 +3,9 @@
 use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared};
 use burn::tensor::Device;
-use veni::baseline::Adam;
-use veni::baseline::gaussians::reference::Grid;
-use veni::baseline::harmonics::{Basis, reference};
+use veni::eval::baseline::Adam;
+use veni::eval::baseline::gaussians::reference::Grid;
+use veni::eval::baseline::harmonics::{Basis, reference};
 use veni::sphere::Equirect;
 use veni::sphere::reference::decoder_directions;
 

@@ -3,7 +3,7 @@
 use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared};
 use burn::tensor::Device;
-use veni::eval::metrics::{Alignment, log_factor, pearson, psnr, scores, spearman, ssim};
+use veni::panorama::metrics::{Alignment, log_factor, pearson, psnr, scores, spearman, ssim};
 use veni::panorama::tonemap::{quantile, srgb, srgb_q98};
 
 /// See [`Family`](crate::Family). No gradients and no tensors: the device plays no part.

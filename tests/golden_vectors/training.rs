@@ -5,7 +5,7 @@ use crate::encoder::Official;
 use crate::{Outcome, Outcome::Compared, Outcome::Elsewhere, Outcome::Skipped, double, field};
 use burn::tensor::{Device, Tensor};
 use serde_json::Value;
-use veni::model::StripeSampling;
+use veni::sphere::StripeSampling;
 use veni::sphere::reference::line_directions;
 use veni::sphere::{Equirect, Stripes};
 use veni::train::loss::{Loss, LossConfig, LossTerms};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use veni_core::output::{Overwrite, refuse_existing};
+use veni_light::output::{Overwrite, refuse_existing};
 
 use crate::output;
 use crate::report::Report;

@@ -5,10 +5,10 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
-use veni_core::Error;
-use veni_core::latent::Latent;
-use veni_core::model::Model;
-use veni_core::panorama::{self, Panorama};
+use veni_light::Error;
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_image::{self, Panorama};
 
 use crate::args::ModelArgs;
 use crate::output::{CUBE_FACES, LATENT};
@@ -106,7 +106,7 @@ fn stored(path: &Path) -> Result<Option<Latent>> {
     if is_latent(path)? {
         return Ok(Some(Latent::load(path)?));
     }
-    let attributes = panorama::attributes(path)?;
+    let attributes = veni_image::attributes(path)?;
     match attributes.get(LATENT) {
         Some(text) => Latent::from_json(text)
             .map(Some)

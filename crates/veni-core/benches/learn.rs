@@ -6,8 +6,8 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
-use veni_core::model::{DecoderConfig, EncoderConfig};
-use veni_core::sphere::Equirect;
+use veni_light::model::{DecoderConfig, EncoderConfig};
+use veni_light::sphere::Equirect;
 use veni_core::train::loss::{Loss, LossConfig};
 use veni_core::vae::{Decoder, Encoder};
 

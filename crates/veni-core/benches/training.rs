@@ -4,8 +4,8 @@
 use std::path::PathBuf;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use veni_core::data::Splits;
-use veni_core::data::random::{Purpose, stream};
+use veni_data::Splits;
+use veni_light::random::{Purpose, stream};
 use veni_core::train::batch::Batches;
 use veni_core::train::loss::Loss;
 use veni_core::train::optimiser::{Group, Optimiser};

@@ -4,11 +4,11 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use veni_core::shade::{
+use veni_fit::shade::{
     Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedImage, ShadedLoss, ShadingForm, Surface,
     Transfer,
 };
-use veni_core::sphere::Equirect;
+use veni_light::sphere::Equirect;
 
 #[allow(clippy::unwrap_used, reason = "a bench has no caller to report to")]
 fn shade(c: &mut Criterion) {
@@ -27,7 +27,7 @@ fn shade(c: &mut Criterion) {
         group.sample_size(20);
         let light: Vec<_> = grid.directions().iter().map(|d| d.map(|v| 0.5 * v)).collect();
         for (name, material) in &materials {
-            for (kept, memory) in [("stored", veni_core::shade::DEFAULT_MEMORY), ("on the fly", 0)] {
+            for (kept, memory) in [("stored", veni_fit::shade::DEFAULT_MEMORY), ("on the fly", 0)] {
                 let lights = Lights::equirect(grid);
                 let transfer =
                     Transfer::with_memory(&surface, material, lights, ShadingForm::Physical, memory).unwrap();

@@ -3,10 +3,10 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use veni_core::field::Curved;
-use veni_core::latent::{Latent, Prior};
-use veni_core::model::{Model, ModelConfig};
-use veni_core::sphere::Equirect;
+use veni_light::field::Curved;
+use veni_light::latent::{Latent, Prior};
+use veni_light::model::{Model, ModelConfig};
+use veni_light::sphere::Equirect;
 
 #[allow(clippy::unwrap_used, reason = "a bench has no caller to report to")]
 fn field(c: &mut Criterion) {

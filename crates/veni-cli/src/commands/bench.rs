@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 use clap::Args;
-use veni_core::sphere::Equirect;
+use veni_light::sphere::Equirect;
 
 use crate::args::ModelArgs;
 use crate::report::{self, Outcome, Report, is_closed_pipe};

@@ -7,8 +7,8 @@ use anyhow::Result;
 use clap::{Args, CommandFactory};
 use clap_mangen::Man as Page;
 use serde_json::json;
-use veni_core::Error;
-use veni_core::output::{Overwrite, refuse_existing, write_atomic};
+use veni_light::Error;
+use veni_light::output::{Overwrite, refuse_existing, write_atomic};
 
 use crate::args::{Cli, Force};
 use crate::report::{Outcome, Report, to_stdout};

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use veni_core::eval::protocol::Watch;
+use veni_eval::protocol::Watch;
 
 use crate::progress::Progress;
 use crate::report::Report;

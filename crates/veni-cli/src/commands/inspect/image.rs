@@ -4,15 +4,15 @@ use std::path::Path;
 
 use anyhow::{Result, anyhow};
 use serde_json::json;
-use veni_core::latent::Latent;
-use veni_core::panorama::{self, Panorama};
+use veni_light::latent::Latent;
+use veni_image::{self, Panorama};
 
 use super::statistics::Statistics;
 use super::{Facts, latent};
 use crate::output::{CUBE_FACES, FRAME, LATENT};
 
 pub(super) fn describe(path: &Path) -> Result<Facts> {
-    let attributes = panorama::attributes(path)?;
+    let attributes = veni_image::attributes(path)?;
     let exr = exr_facts(path)?;
     let mut facts = Facts::new(if exr.is_some() { "OpenEXR image" } else { "Radiance HDR image" });
     let cube = exr.as_ref().is_some_and(|e| e.cube) || attributes.contains_key(CUBE_FACES);

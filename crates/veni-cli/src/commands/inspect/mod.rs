@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Map, Value};
-use veni_core::Error;
+use veni_light::Error;
 
 use crate::report::{self, Outcome, Report, is_closed_pipe};
 

@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use veni_core::latent::Latent;
-use veni_core::panorama;
-use veni_core::sphere::Equirect;
+use veni_light::latent::Latent;
+use veni_light::sphere::Equirect;
 
 use crate::args::ModelArgs;
 use crate::output::CUBE_FACES;
@@ -25,7 +24,7 @@ pub(super) fn from_file(
         let latent = source::from_file(path, &loaded, report)?;
         return decode(&loaded, &latent, grid, turn);
     }
-    if panorama::attributes(path)?.contains_key(CUBE_FACES) {
+    if veni_image::attributes(path)?.contains_key(CUBE_FACES) {
         bail!("{}: a cube map is no panorama; name an equirectangular image", path.display());
     }
     let image = source::panorama(path, report)?;

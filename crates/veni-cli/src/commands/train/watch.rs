@@ -1,6 +1,6 @@
 //! What a person sees of a run while it goes.
 
-use veni_core::eval::reconstruction::MeanScores;
+use veni_image::metrics::MeanScores;
 use veni_core::train::progress::{self, StepReport, ValidationReport};
 
 use crate::progress::Progress;

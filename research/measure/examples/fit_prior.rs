@@ -1,5 +1,5 @@
 //! What the prior's weight in a fit costs and gives:
-//! `cargo run --release -p veni-core --example fit_prior -- MODEL FOLDER SHEET.png [WEIGHT …]`.
+//! `cargo run --release -p veni-research --example fit_prior -- MODEL FOLDER SHEET.png [WEIGHT …]`.
 //!
 //! Each panorama of FOLDER is fitted at 64 × 32 from the encoder's latent, once per weight. Beside the scores stands what
 //! becomes of ways between neighbouring panoramas' latents, (1 − t) Z₀ + t Z₁ in eight steps: the largest step over the mean
@@ -13,8 +13,8 @@ use std::path::Path;
 use burn::tensor::Device;
 use veni_core::data::coarsen::{averaged, coarse_grid};
 use veni_core::data::{Dataset, panorama_files};
-use veni_core::eval::figure::{Sheet, display};
-use veni_core::eval::metrics::{Alignment, log_error, scores};
+use veni_eval::figure::{Sheet, display};
+use veni_core::panorama::metrics::{Alignment, log_error, scores};
 use veni_core::field::Decoder;
 use veni_core::fit::{FitConfig, FitDecoder, FitTarget, fit};
 use veni_core::latent::Latent;

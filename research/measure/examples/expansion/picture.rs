@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use veni_core::panorama::expand::ExpandOptions;
+use veni_core::expand::Expand;
+use veni_core::expand::ExpandOptions;
 use veni_core::panorama::tonemap::srgb;
 use veni_core::panorama::{Panorama, Transfer};
 use veni_core::sphere::Equirect;

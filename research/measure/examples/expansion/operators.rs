@@ -1,6 +1,6 @@
 //! Published operators to compare with, on linear values where 1 is white.
 
-use veni_core::panorama::expand::Analysis;
+use veni_core::expand::Analysis;
 use veni_core::panorama::{Panorama, luminance};
 
 /// H. Landis, "Production-ready global illumination" (SIGGRAPH 2002 course notes): above the threshold 0.5, values are

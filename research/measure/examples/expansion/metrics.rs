@@ -1,6 +1,7 @@
 //! How far expanded panoramas are from the truth.
 
-use veni_core::panorama::expand::{Analysis, ExpandOptions};
+use veni_core::expand::Expand;
+use veni_core::expand::{Analysis, ExpandOptions};
 use veni_core::panorama::{Panorama, Transfer, luminance};
 
 use crate::Failure;

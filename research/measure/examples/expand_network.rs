@@ -18,8 +18,10 @@ use std::time::Instant;
 use onnx_file::OnnxFile;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
-use veni_core::panorama::expand::ExpandOptions;
-use veni_core::panorama::expand::network::{NetworkOptions, OnnxNetwork};
+use veni_core::expand::Expand;
+use veni_core::expand::ExpandOptions;
+use veni_core::expand::Expand;
+use veni_core::expand::network::{NetworkOptions, OnnxNetwork};
 use veni_core::panorama::{LdrPanorama, Transfer};
 use veni_core::sphere::Equirect;
 

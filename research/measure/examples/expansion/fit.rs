@@ -1,6 +1,6 @@
 //! The linear functions of the expansion, by least squares.
 
-use veni_core::panorama::expand::{Analysis, FEATURES, Region};
+use veni_core::expand::{Analysis, FEATURES, Region};
 use veni_core::panorama::{Transfer, luminance};
 
 use crate::Failure;

@@ -1,5 +1,5 @@
 //! Fits the baselines to every panorama of a folder, at 128 × 64, and prints their mean scores as Markdown:
-//! `cargo run --release -p veni-core --example baselines -- FOLDER D [D …]`.
+//! `cargo run --release -p veni-research --example baselines -- FOLDER D [D …]`.
 //!
 //! Each cell is scored with an exposure factor first, then with the authors' factor on log radiance.
 
@@ -9,10 +9,10 @@ use std::path::Path;
 use std::time::Instant;
 
 use rayon::prelude::*;
-use veni_core::baseline::{Baseline, Kind, Space};
+use veni_eval::baseline::{Baseline, Kind, Space};
 use veni_core::data::{Dataset, panorama_files};
-use veni_core::eval::metrics::Alignment;
-use veni_core::eval::reconstruction::Reconstruction;
+use veni_core::panorama::metrics::Alignment;
+use veni_core::data::Reconstruction;
 use veni_core::sphere::Equirect;
 use veni_core::{Error, Result};
 

@@ -1,5 +1,5 @@
 //! What a fit that weighs pixels by their light gains, and what it costs:
-//! `cargo run --release -p veni-core --example light -- MODEL FOLDER FACTOR [SHARE …]`.
+//! `cargo run --release -p veni-research --example light -- MODEL FOLDER FACTOR [SHARE …]`.
 //!
 //! Each panorama of FOLDER, at 128 × 64, is fitted on means of FACTOR × FACTOR pixels (1, 2 or 4) from the encoder's latent
 //! with the model's own prior, once per share of the weight that goes by light (`Objective::Energy`; 0 is the plain squared
@@ -14,7 +14,7 @@ use burn::tensor::Device;
 use rayon::prelude::*;
 use veni_core::data::coarsen::{averaged, coarse_grid};
 use veni_core::data::{Dataset, panorama_files};
-use veni_core::eval::metrics::{Alignment, scores, sun_error};
+use veni_core::panorama::metrics::{Alignment, scores, sun_error};
 use veni_core::fit::{FitConfig, FitDecoder, FitTarget, Objective, fit};
 use veni_core::latent::Latent;
 use veni_core::model::Model;

@@ -1,5 +1,5 @@
 //! How much generated skies look like photographed ones, in numbers and in pictures:
-//! `cargo run --release -p veni-core --example synth_statistics -- FOLDER [COUNT [SEED [SHEETS]]]`
+//! `cargo run --release -p veni-research --example synth_statistics -- FOLDER [COUNT [SEED [SHEETS]]]`
 //!
 //! FOLDER holds panoramas. Prints medians and quartiles of statistics of both sets at 128 × 64, each panorama at
 //! exposure 0. SHEETS is a folder for `real.png` and `synthetic.png`, tonemapped alike (98 % quantile is white).

@@ -1,4 +1,4 @@
-//! Trains a model: `cargo run --release -p veni-core --example train -- DATA OUT [small|tiny|paper] [key=value …]`,
+//! Trains a model: `cargo run --release -p veni-research --example train -- DATA OUT [small|tiny|paper] [key=value …]`,
 //! or continues a run: `… --example train -- --resume OUT`.
 
 #![allow(clippy::print_stdout, reason = "a program for a terminal")]

@@ -1,6 +1,6 @@
 //! Seconds of a training step and peak memory, as one line of JSON: our side of `benches/peer/`.
 //!
-//! `cargo run --release -p veni-core --example train_step -- DATA PRESET LATENT_VECTORS STEPS [--record FILE] [key=value …]`
+//! `cargo run --release -p veni-research --example train_step -- DATA PRESET LATENT_VECTORS STEPS [--record FILE] [key=value …]`
 //!
 //! One step is not timed, STEPS are. Batches are prepared beforehand; a run does it on another thread. `--record` also
 //! writes weights, batch, losses and gradients of the first step, so that others can compute the same.

@@ -1,6 +1,6 @@
 //! Prints the machine's f32 matrix-product rate, and the decoder's as a fraction of it.
 //!
-//! `cargo run --release -p veni-core --example gemm_rate`; `RAYON_NUM_THREADS=1` before it for one core.
+//! `cargo run --release -p veni-research --example gemm_rate`; `RAYON_NUM_THREADS=1` before it for one core.
 //!
 //! The rate is that of burn's flex device (the `gemm` crate) on 2048 × 2048 matrices. The decoder bakes filler
 //! weights of the paper's sizes; its multiply-adds are 5(N+2)·128 + 12·128² + 128·3 per direction. Both take

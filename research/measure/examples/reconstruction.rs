@@ -1,5 +1,5 @@
 //! Scores a model on a folder of panoramas and draws what it does:
-//! `cargo run --release -p veni-core --example reconstruction -- MODEL FOLDER [OVERVIEW.png]`.
+//! `cargo run --release -p veni-research --example reconstruction -- MODEL FOLDER [OVERVIEW.png]`.
 //!
 //! Prints Markdown: per panorama and in the mean, the autoencoder pass and a latent optimised for each panorama.
 
@@ -10,9 +10,11 @@ use std::path::Path;
 use burn::tensor::Device;
 use image::{Rgb, RgbImage};
 use veni_core::data::{Dataset, Item, panorama_files};
-use veni_core::eval::metrics::Alignment;
-use veni_core::eval::reconstruction::{Reconstruction, Start};
-use veni_core::fit::{FitConfig, FitDecoder};
+use veni_core::panorama::metrics::Alignment;
+use veni_core::data::Reconstruction;
+use veni_core::LoadedModel;
+use veni_eval::codec::{Autoencoder, Codec, Optimised};
+use veni_eval::fitting::FitSettings;
 use veni_core::latent::Latent;
 use veni_core::model::Model;
 use veni_core::output::{Overwrite, write_atomic};
@@ -33,17 +35,10 @@ fn main() -> Result<()> {
     let veni = Veni::from_model(&model, &Device::flex())?;
     let set = Dataset::load(&panorama_files(Path::new(folder))?, Equirect::new(128, 64))?;
 
-    let pass = Reconstruction::autoencoder(&veni, &set, Alignment::Exposure)?;
-    let decoder = model.decoder()?;
-    let best = Reconstruction::optimised(
-        &veni,
-        FitDecoder::from(&decoder),
-        &set,
-        Start::Encoder,
-        &FitConfig::thorough(),
-        2,
-        Alignment::Exposure,
-    )?;
+    let loaded = LoadedModel::new("model", model.clone(), &Device::flex())?;
+    let encoder = Autoencoder::new(&loaded).ok_or_else(|| Error::invalid("the model has no encoder"))?;
+    let pass = scores(&encoder, &set)?;
+    let best = scores(&Optimised::new(&loaded, FitSettings::thorough(set.grid(), false)), &set)?;
     println!("| panorama | LDR PSNR | HDR PSNR | SSIM | optimised LDR PSNR | HDR PSNR | SSIM |");
     println!("|---|---|---|---|---|---|---|");
     let row = |name: &str, a: &[f64; 3], b: &[f64; 3]| {
@@ -66,7 +61,15 @@ fn main() -> Result<()> {
     overview.map_or(Ok(()), |path| draw(path, &model, &veni, &set))
 }
 
-/// The authors' protocol: their factor on log radiance as stored in the files, exposure included.
+/// Exposure-aligned scores of what a codec makes of each panorama.
+fn scores(codec: &dyn Codec, set: &Dataset) -> Result<Reconstruction> {
+    Reconstruction::by_parts(set, Alignment::Exposure, |range| {
+        let one = |item: &Item| codec.decode(set.grid(), &codec.encode(set.grid(), &item.log_radiance)?);
+        set.items()[range].iter().map(one).collect()
+    })
+}
+
+/// The reference implementation's protocol: its factor on log radiance as stored in the files, exposure included.
 fn reference_protocol(veni: &Veni, set: &Dataset) -> Result<Reconstruction> {
     let images: Vec<_> = set.items().iter().map(|item| item.log_radiance.as_slice()).collect();
     let latents: Vec<_> = veni.encode(set.grid(), &images)?.into_iter().map(|e| e.vectors).collect();

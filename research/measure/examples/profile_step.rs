@@ -1,6 +1,6 @@
 //! Where the time of a training step goes.
 //!
-//! `cargo run --release -p veni-core --example profile_step -- DATA [small|tiny|paper] [key=value …]`
+//! `cargo run --release -p veni-research --example profile_step -- DATA [small|tiny|paper] [key=value …]`
 
 #![allow(clippy::print_stdout, reason = "a program for a terminal")]
 

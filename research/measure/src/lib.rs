@@ -1,0 +1,1 @@
+//! The scripts behind the tables of docs/results are in `examples/`.
