@@ -1,0 +1,75 @@
+//! One panorama of 128 × 64 to its latent: the shipped models' size and the paper's, on one thread and on all.
+#![allow(missing_docs, reason = "criterion's macros make undocumented items")]
+
+use std::collections::BTreeMap;
+use std::hint::black_box;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use veni_core::model::{
+    DecoderConfig, EncoderConfig, Model, ModelConfig, ModelInfo, ModelKind, Tensor, decoder_schema,
+};
+use veni_core::sphere::Equirect;
+use veni_fit::Encoder;
+use veni_fit::encoder::encoder_schema;
+
+/// A model of weights that are random enough: what they are does not change the time.
+fn model(encoder: EncoderConfig, latent_vectors: usize) -> Model {
+    let config = ModelConfig {
+        kind: ModelKind::Veni,
+        latent_vectors,
+        decoder: DecoderConfig { hidden: 8, layers: 1, heads: 1, ..DecoderConfig::default() },
+        encoder: Some(encoder),
+    };
+    let schema = decoder_schema(&config).into_iter().chain(encoder_schema(&config).expect("a valid size"));
+    let mut state = 1u32;
+    let mut draw = |scale: f32| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        scale * (state as f32 / u32::MAX as f32 - 0.5)
+    };
+    let tensors: BTreeMap<_, _> = schema
+        .map(|(name, shape)| {
+            let scale = (12.0 / shape[0] as f32).sqrt();
+            let data = (0..shape.iter().product()).map(|_| draw(scale)).collect();
+            (name, Tensor { shape, data })
+        })
+        .collect();
+    Model::new(config, tensors, ModelInfo::default()).expect("the tensors of the schema")
+}
+
+fn encode(criterion: &mut Criterion) {
+    let small = EncoderConfig {
+        samples: Some(128),
+        channels: 96,
+        depth: 4,
+        heads: 6,
+        head_channels: 16,
+        ..EncoderConfig::default()
+    };
+    let grid = Equirect::new(128, 64);
+    let image: Vec<f32> = (0..3 * grid.len()).map(|i| (1.7 * i as f32).sin()).collect();
+    let images: Vec<&[f32]> = vec![&image; 8];
+    let mut group = criterion.benchmark_group("encode");
+    group.sample_size(30);
+    for (name, config) in [("small", small), ("paper", EncoderConfig::default())] {
+        for n in [9, 100] {
+            let encoder = Encoder::new(&model(config.clone(), n)).expect("a whole model");
+            let mut encode = |title: &str, images: &[&[f32]]| {
+                group.bench_function(format!("{name}, N = {n}, {title}"), |b| {
+                    b.iter(|| encoder.encode(grid, black_box(images)).expect("a panorama"));
+                });
+            };
+            encode("1 panorama", &images[..1]);
+            if n == 9 {
+                encode("8 panoramas", &images);
+                #[cfg(feature = "parallel")]
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+                #[cfg(feature = "parallel")]
+                pool.install(|| encode("1 panorama, 1 thread", &images[..1]));
+            }
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, encode);
+criterion_main!(benches);
