@@ -53,19 +53,17 @@ fn encode(criterion: &mut Criterion) {
     for (name, config) in [("small", small), ("paper", EncoderConfig::default())] {
         for n in [9, 100] {
             let encoder = Encoder::new(&model(config.clone(), n)).expect("a whole model");
-            let mut encode = |title: &str, images: &[&[f32]]| {
-                group.bench_function(format!("{name}, N = {n}, {title}"), |b| {
-                    b.iter(|| encoder.encode(grid, black_box(images)).expect("a panorama"));
-                });
-            };
-            encode("1 panorama", &images[..1]);
-            if n == 9 {
-                encode("8 panoramas", &images);
-                #[cfg(feature = "parallel")]
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-                #[cfg(feature = "parallel")]
-                pool.install(|| encode("1 panorama, 1 thread", &images[..1]));
+            let run = |images: &[&[f32]]| encoder.encode(grid, black_box(images)).expect("panoramas");
+            group.bench_function(format!("{name}, N = {n}, 1 panorama"), |b| b.iter(|| run(&images[..1])));
+            if n == 100 {
+                continue;
             }
+            group.bench_function(format!("{name}, N = {n}, 8 panoramas"), |b| b.iter(|| run(&images)));
+            #[cfg(feature = "parallel")]
+            group.bench_function(format!("{name}, N = {n}, 1 panorama, 1 thread"), |b| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+                b.iter(|| pool.install(|| run(&images[..1])));
+            });
         }
     }
     group.finish();
