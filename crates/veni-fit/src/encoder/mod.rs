@@ -15,6 +15,8 @@ mod attention;
 mod feed_forward;
 mod fold;
 mod gate;
+#[cfg(test)]
+mod golden;
 mod layout;
 mod linear;
 mod matrix;
