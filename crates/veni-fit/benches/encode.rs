@@ -1,40 +1,16 @@
 //! One panorama of 128 × 64 to its latent: the shipped models' size and the paper's, on one thread and on all.
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
-use std::collections::BTreeMap;
+#[allow(dead_code, reason = "each user needs a part of it")]
+#[path = "../tests/common/mod.rs"]
+mod common;
+
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use veni_core::model::{
-    DecoderConfig, EncoderConfig, Model, ModelConfig, ModelInfo, ModelKind, Tensor, decoder_schema,
-};
+use veni_core::model::EncoderConfig;
 use veni_core::sphere::Equirect;
 use veni_fit::Encoder;
-use veni_fit::encoder::encoder_schema;
-
-/// A model of weights that are random enough: what they are does not change the time.
-fn model(encoder: EncoderConfig, latent_vectors: usize) -> Model {
-    let config = ModelConfig {
-        kind: ModelKind::Veni,
-        latent_vectors,
-        decoder: DecoderConfig { hidden: 8, layers: 1, heads: 1, ..DecoderConfig::default() },
-        encoder: Some(encoder),
-    };
-    let schema = decoder_schema(&config).into_iter().chain(encoder_schema(&config).expect("a valid size"));
-    let mut state = 1u32;
-    let mut draw = |scale: f32| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        scale * (state as f32 / u32::MAX as f32 - 0.5)
-    };
-    let tensors: BTreeMap<_, _> = schema
-        .map(|(name, shape)| {
-            let scale = (12.0 / shape[0] as f32).sqrt();
-            let data = (0..shape.iter().product()).map(|_| draw(scale)).collect();
-            (name, Tensor { shape, data })
-        })
-        .collect();
-    Model::new(config, tensors, ModelInfo::default()).expect("the tensors of the schema")
-}
 
 fn encode(criterion: &mut Criterion) {
     let small = EncoderConfig {
@@ -52,7 +28,7 @@ fn encode(criterion: &mut Criterion) {
     group.sample_size(30);
     for (name, config) in [("small", small), ("paper", EncoderConfig::default())] {
         for n in [9, 100] {
-            let encoder = Encoder::new(&model(config.clone(), n)).expect("a whole model");
+            let encoder = Encoder::new(&common::model(config.clone(), n)).expect("a whole model");
             let run = |images: &[&[f32]]| encoder.encode(grid, black_box(images)).expect("panoramas");
             group.bench_function(format!("{name}, N = {n}, 1 panorama"), |b| b.iter(|| run(&images[..1])));
             if n == 100 {
