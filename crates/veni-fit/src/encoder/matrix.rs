@@ -110,8 +110,9 @@ impl PackedRows {
                     row if row < x.count => &x.data[row * x.stride + from..][..depth],
                     _ => &ZEROS[..depth],
                 };
-                let rows: [&[f32]; TILE] = std::array::from_fn(row);
-                interleave(rows, tile);
+                for at in (0..TILE).step_by(SIDE) {
+                    interleave([row(at), row(at + 1), row(at + 2), row(at + 3)], at, tile);
+                }
             }
         }
     }
@@ -119,13 +120,24 @@ impl PackedRows {
 
 static ZEROS: [f32; DEPTH] = [0.0; DEPTH];
 
-/// Element k of every row next to each other.
-fn interleave(rows: [&[f32]; TILE], tile: &mut [[f32; TILE]]) {
-    let rows = rows.map(|row| &row[..tile.len()]);
-    for (k, column) in tile.iter_mut().enumerate() {
-        for (value, row) in column.iter_mut().zip(rows) {
-            *value = row[k];
+/// Rows that are interleaved at a time.
+const SIDE: usize = 4;
+
+/// Element k of some rows next to each other, from place `at` on, in squares of 4 × 4, which compile to shuffles of
+/// vectors.
+fn interleave([a, b, c, d]: [&[f32]; SIDE], at: usize, tile: &mut [[f32; TILE]]) {
+    let (squares, rest) = tile.as_chunks_mut::<SIDE>();
+    let whole = SIDE * squares.len();
+    let chunks = <[f32]>::as_chunks::<SIDE>;
+    let rows = chunks(a).0.iter().zip(chunks(b).0).zip(chunks(c).0).zip(chunks(d).0);
+    for (square, (((a, b), c), d)) in squares.iter_mut().zip(rows) {
+        for (k, column) in square.iter_mut().enumerate() {
+            column[at..at + SIDE].copy_from_slice(&[a[k], b[k], c[k], d[k]]);
         }
+    }
+    let rows = a[whole..].iter().zip(&b[whole..]).zip(&c[whole..]).zip(&d[whole..]);
+    for (column, (((a, b), c), d)) in rest.iter_mut().zip(rows) {
+        column[at..at + SIDE].copy_from_slice(&[*a, *b, *c, *d]);
     }
 }
 
