@@ -32,7 +32,7 @@ impl Gate {
     /// The ReLU of `products`, `[token, coordinate, panel, (q, k), PANEL]`, into as many panels of `out` from
     /// channel `at` on; `out` is `[token, stride]`, coordinates `width` apart.
     pub(super) fn apply(&self, products: &[f32], coordinates: usize, out: &mut [f32], place: Place) {
-        pulp::Arch::new().dispatch(Relu { products, coordinates, out, place, form: self.form });
+        super::simd::dispatch(Relu { products, coordinates, out, place, form: self.form });
     }
 }
 

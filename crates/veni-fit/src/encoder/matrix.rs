@@ -157,7 +157,7 @@ impl Product<'_> {
     pub(super) fn run(self) {
         let (x, w) = (self.x.inputs, self.weight.inputs);
         assert_eq!(x, w, "rows of {x} do not fit a matrix of {w} inputs");
-        pulp::Arch::new().dispatch(self);
+        super::simd::dispatch(self);
     }
 }
 

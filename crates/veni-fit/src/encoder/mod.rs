@@ -24,6 +24,7 @@ mod norm;
 mod parallel;
 mod posterior;
 mod room;
+mod simd;
 mod so2;
 mod softmax;
 mod tokens;

@@ -24,7 +24,7 @@ pub(super) struct AddNormalised<'a> {
 
 impl AddNormalised<'_> {
     pub(super) fn run(self) {
-        pulp::Arch::new().dispatch(self);
+        super::simd::dispatch(self);
     }
 }
 

@@ -19,7 +19,7 @@ pub(super) struct Softmax<'a> {
 
 impl Softmax<'_> {
     pub(super) fn run(self) {
-        pulp::Arch::new().dispatch(self);
+        super::simd::dispatch(self);
     }
 }
 

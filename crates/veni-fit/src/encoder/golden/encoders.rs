@@ -67,7 +67,7 @@ fn log_variances(encoded: &[Encoded]) -> Data {
     Data::new([values.len()], values)
 }
 
-fn compute(case: &Case) -> Result<(), Skipped> {
+pub(super) fn compute(case: &Case) -> Result<(), Skipped> {
     if case.module() != "VENIEncoder" || !case.expects("out.mu") {
         return Err("no encoder");
     }

@@ -14,7 +14,7 @@ use crate::encoder::norm::AddNormalised;
 use crate::encoder::transformer::{Buffers, Transformer};
 use crate::encoder::weights::{Shape, Shapes, Tensors};
 
-fn compute(case: &Case) -> Result<(), Skipped> {
+pub(super) fn compute(case: &Case) -> Result<(), Skipped> {
     let kind = if case.module().starts_with("SOx") { VectorLayer::So2 } else { VectorLayer::Vn };
     match case.module() {
         "SOxLinear" | "VNLinear" => linear(case, kind),

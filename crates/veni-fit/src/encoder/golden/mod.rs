@@ -88,3 +88,18 @@ fn run(names: &[String], compute: impl Fn(&Case) -> Result<(), Skipped>) -> (Vec
     assert!(closest.0 > 0.0 && closest.0 <= 1.0, "{closest:?}");
     (passed, skipped)
 }
+
+/// What processors with narrower vectors would compute.
+#[test]
+fn narrower_vectors_compute_the_same() {
+    use super::simd::narrow::{CHOSEN, NONE, SCALAR, V3};
+    use std::sync::atomic::Ordering::Relaxed;
+    let small = ["c02_", "c03_encoder_default_nomirror", "c03_encoder_late_split", "c03_encoder_full_vn"];
+    for vectors in [SCALAR, V3] {
+        CHOSEN.store(vectors, Relaxed);
+        let (layers, _) = run(&names(&small[..1]), layers::compute);
+        let (encoders, _) = run(&names(&small[1..]), encoders::compute);
+        CHOSEN.store(NONE, Relaxed);
+        assert_eq!((layers.len(), encoders.len()), (17, 3), "vectors {vectors}");
+    }
+}
