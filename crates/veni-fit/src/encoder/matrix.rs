@@ -225,13 +225,10 @@ fn tile<S: Simd, const ROWS: usize, const FROM: usize>(
         }
     }
     let width = 2 * S::F32_LANES;
-    for r in 0..ROWS {
-        if FROM + r < y.rows {
-            let row = &mut y.data[(FROM + r) * y.stride + vector * S::F32_LANES..][..width];
-            let row = S::as_mut_simd_f32s(row).0;
-            for (value, sum) in row.iter_mut().zip(sums[r]) {
-                *value = if y.add { simd.add_f32s(*value, sum) } else { sum };
-            }
+    for (r, sums) in (FROM..y.rows).zip(sums) {
+        let row = &mut y.data[r * y.stride + vector * S::F32_LANES..][..width];
+        for (value, sum) in S::as_mut_simd_f32s(row).0.iter_mut().zip(sums) {
+            *value = if y.add { simd.add_f32s(*value, sum) } else { sum };
         }
     }
 }

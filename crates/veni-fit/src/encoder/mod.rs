@@ -175,17 +175,17 @@ impl Encoder {
         }))
     }
 
-    /// Images on all cores; where there are fewer images than cores, each on all of them.
+    /// Images on all cores; where there are fewer images than cores, several cores to an image.
     fn for_each_image<T: ?Sized + Sync>(
         &self,
         images: &[&T],
         encode: impl Fn(&T, usize) -> Encoded + Sync + Send,
     ) -> Vec<Encoded> {
         let threads = parallel::threads();
-        let (between, within) = if images.len() < threads { (1, threads) } else { (threads, 1) };
+        let within = threads.div_ceil(images.len().max(1));
         let mut out: Vec<Option<Encoded>> = vec![None; images.len()];
         let tasks = images.iter().zip(&mut out).collect();
-        for_each(between, tasks, |(image, out)| *out = Some(encode(image, within)));
+        for_each(threads, tasks, |(image, out)| *out = Some(encode(image, within)));
         out.into_iter().flatten().collect()
     }
 
@@ -230,7 +230,7 @@ impl Encoder {
             Some(size) if size <= LARGEST => Ok(()),
             _ => Err(Error::invalid(format!(
                 "{stripes} tokens of {channels} channels would need more than {} MiB",
-                LARGEST * size_of::<f32>() >> 20
+                (LARGEST * size_of::<f32>()) >> 20
             ))),
         }
     }
