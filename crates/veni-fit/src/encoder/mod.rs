@@ -79,8 +79,8 @@ impl Encoder {
     ///
     /// # Errors
     /// [`Error::Invalid`] if the model has no encoder, if one of its tensors is missing, has another shape than the
-    /// configuration implies, or is unexpected, if a Vector-Neuron layer is asked to change the number of
-    /// coordinates, or if a token would need more than 1 GiB.
+    /// configuration implies, or is unexpected, or if a Vector-Neuron layer is asked to change the number of
+    /// coordinates. All is checked before anything is allocated.
     pub fn new(model: &Model) -> Result<Self> {
         let config = model.config().encoder.as_ref().filter(|_| model.has_encoder());
         let config = config.ok_or_else(|| Error::invalid("the model has no encoder: it can only decode"))?;

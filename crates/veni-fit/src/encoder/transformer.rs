@@ -89,68 +89,70 @@ impl Transformer {
     /// Applies all blocks to `buffers.x`. With `first_only` the last one computes the first token alone, which looks
     /// at all of them.
     pub(super) fn run(&self, buffers: &mut Buffers, first_only: bool, workers: usize) {
+        let tokens = buffers.x.len() / self.token();
+        for l in 0..self.blocks.len() {
+            let looking = if first_only && l + 1 == self.blocks.len() { 1 } else { tokens };
+            self.enter(l, buffers, looking, workers);
+            self.look(l, buffers, looking, workers);
+        }
+        let Buffers { x, seen, .. } = buffers;
+        let looking = if first_only { 1 } else { tokens };
+        let share = share(looking, workers);
+        let tasks = x[..looking * self.token()].chunks_mut(share * self.token()).enumerate();
+        for_each(workers, tasks.collect(), |(t, x)| {
+            self.rooms.with(|room| self.finish(self.blocks.last(), seen, t * share, x, room));
+        });
+    }
+
+    /// The rest of the block before block `l`, then this one's keys and values of all tokens and queries of the first
+    /// `looking`.
+    fn enter(&self, l: usize, buffers: &mut Buffers, looking: usize, workers: usize) {
         let Buffers { x, query, key_value, seen } = buffers;
+        let attention = &self.blocks[l].attention;
+        let layer = attention.query.layer();
+        let before = l.checked_sub(1).map(|l| &self.blocks[l]);
         let tokens = x.len() / self.token();
-        let share = tokens.div_ceil(workers).min(TOKENS);
-        for l in 0..=self.blocks.len() {
-            // the rest of the block before, and queries, keys and values of this one
-            let before = l.checked_sub(1).map(|l| &self.blocks[l].attention).map(|a| (a, &*seen));
-            let looking = if first_only && l == self.blocks.len() { 1 } else { tokens };
-            let Some(block) = self.blocks.get(l) else {
-                let x = &mut x[..looking * self.token()];
-                let tasks = x.chunks_mut(share * self.token()).enumerate().collect();
-                for_each(workers, tasks, |(t, x)| {
-                    self.rooms.with(|room| self.finish(l, before, t * share, x, room));
-                });
-                return;
-            };
-            let looks_later = first_only && l + 1 == self.blocks.len();
-            let attention = &block.attention;
-            let inner = self.coordinates * attention.query.width();
-            let queries = grown(query, tokens * inner);
-            let key_values = grown(key_value, tokens * 2 * inner);
-            let tasks = x.chunks_mut(share * self.token());
-            let tasks =
-                tasks.zip(queries.chunks_mut(share * inner)).zip(key_values.chunks_mut(share * 2 * inner));
-            for_each(workers, tasks.enumerate().collect(), |(t, ((x, query), key_value))| {
-                self.rooms.with(|room| {
-                    self.finish(l, before, t * share, x, room);
-                    let prepared = &mut room.gathered.1;
-                    prepared.prepare(attention.query.layer(), self.feature(x));
-                    attention.key_value.apply(prepared, key_value);
-                    if !looks_later {
-                        attention.query.apply(prepared, query);
-                    }
-                });
+        let (share, inner) = (share(tokens, workers), self.coordinates * attention.query.width());
+        let queries = grown(query, tokens * inner);
+        let key_values = grown(key_value, tokens * 2 * inner).chunks_mut(share * 2 * inner);
+        let tasks = x.chunks_mut(share * self.token()).zip(queries.chunks_mut(share * inner)).zip(key_values);
+        for_each(workers, tasks.enumerate().collect(), |(t, ((x, query), key_value))| {
+            self.rooms.with(|room| {
+                self.finish(before, seen, t * share, x, room);
+                let prepared = &mut room.gathered.1;
+                prepared.prepare(layer, self.feature(x));
+                attention.key_value.apply(prepared, key_value);
+                if looking == tokens {
+                    attention.query.apply(prepared, query);
+                }
             });
-            let looking = if looks_later { 1 } else { tokens };
-            if looks_later {
-                self.rooms.with(|room| {
-                    let prepared = &mut room.gathered.1;
-                    prepared.prepare(attention.query.layer(), self.feature(&x[..self.token()]));
-                    attention.query.apply(prepared, &mut queries[..inner]);
-                });
-            }
-            let queries = &queries[..looking * inner];
-            seen.resize(attention.heads * looking * attention.seen_width(), 0.0);
-            let heads = seen.chunks_mut(looking * attention.seen_width()).enumerate().collect();
-            for_each(workers, heads, |(h, seen)| {
-                self.heads.with(|room| attention.look(h, queries, key_values, seen, room));
+        });
+        if looking < tokens {
+            self.rooms.with(|room| {
+                let prepared = &mut room.gathered.1;
+                prepared.prepare(layer, self.feature(&x[..looking * self.token()]));
+                attention.query.apply(prepared, &mut queries[..looking * inner]);
             });
         }
     }
 
-    /// What follows the heads in the block before block `l`, for the tokens `x`, the first of which is token `first`.
-    fn finish(
-        &self,
-        l: usize,
-        before: Option<(&Attention, &Vec<f32>)>,
-        first: usize,
-        x: &mut [f32],
-        room: &mut Room,
-    ) {
-        let Some((attention, seen)) = before else { return };
-        let Block { norm1, feed_forward, norm2, .. } = &self.blocks[l - 1];
+    /// What the heads of block `l` see for the first `looking` tokens.
+    fn look(&self, l: usize, buffers: &mut Buffers, looking: usize, workers: usize) {
+        let Buffers { x, query, key_value, seen } = buffers;
+        let attention = &self.blocks[l].attention;
+        let inner = self.coordinates * attention.query.width();
+        let (query, key_value) =
+            (&query[..looking * inner], &key_value[..x.len() / self.token() * 2 * inner]);
+        seen.resize(attention.heads * looking * attention.seen_width(), 0.0);
+        let heads = seen.chunks_mut(looking * attention.seen_width()).enumerate();
+        for_each(workers, heads.collect(), |(h, seen)| {
+            self.heads.with(|room| attention.look(h, query, key_value, seen, room));
+        });
+    }
+
+    /// What follows the heads in a block, for the tokens `x`, the first of which is token `first`.
+    fn finish(&self, block: Option<&Block>, seen: &[f32], first: usize, x: &mut [f32], room: &mut Room) {
+        let Some(Block { attention, norm1, feed_forward, norm2 }) = block else { return };
         let (channels, coordinates) = (self.channels, self.coordinates);
         let Room { gathered, branch, lengths, feed_forward: room } = room;
         let y = grown(branch, x.len());
@@ -164,4 +166,9 @@ impl Transformer {
         let (coordinates, channels) = (self.coordinates, self.channels);
         Feature { data, coordinates, channels, width: padded(channels) }
     }
+}
+
+/// Tokens of one task.
+fn share(tokens: usize, workers: usize) -> usize {
+    tokens.div_ceil(workers).min(TOKENS)
 }
