@@ -2,7 +2,7 @@
 # The lighting world must not know the learning world: proves that no burn crate is in what a renderer embeds.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-for package in "veni-core --no-default-features" "veni-gpu"; do
+for package in "veni-core --no-default-features" "veni-gpu" "veni-fit"; do
     # shellcheck disable=SC2086 # the features belong to the words
     tree=$(cargo tree --edges normal,build --prefix none -p $package)
     if grep -E '^(burn|cubecl)' <<<"$tree"; then

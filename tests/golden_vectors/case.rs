@@ -1,8 +1,9 @@
 //! One golden file: its metadata, its tensors, and what has been compared with it so far.
+//!
+//! Without burn, because the tests of the encoder without burn read the same files.
 
-use crate::compare::{self, Tolerance};
-use crate::filler;
-use burn::tensor::{Device, Tensor, TensorData};
+use super::compare::{self, Tolerance};
+use super::filler;
 use serde_json::Value;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -42,19 +43,6 @@ impl Data {
     /// A scalar (shape []).
     pub(crate) fn scalar(value: f32) -> Self {
         Self::new([], vec![value])
-    }
-
-    /// The values of a burn tensor, any rank.
-    pub(crate) fn of<const D: usize>(tensor: &Tensor<D>) -> Self {
-        let values = tensor.to_data().convert::<f32>().try_into_vec().expect("a float tensor");
-        Self::new(tensor.dims().to_vec(), values)
-    }
-
-    /// The same numbers as a burn tensor; the number of elements must agree, the shape may differ.
-    pub(crate) fn tensor<const D: usize>(&self, shape: [usize; D], device: &Device) -> Tensor<D> {
-        let count: usize = shape.iter().product();
-        assert_eq!(count, self.values.len(), "cannot view {:?} as {shape:?}", self.shape);
-        Tensor::from_data(TensorData::new(self.values.clone(), shape), device)
     }
 
     /// Rows and columns exchanged: the authors' `[out, in]` to our `[in, out]` and back.
@@ -165,13 +153,6 @@ impl Case {
         self.get(name).unwrap_or_else(|| panic!("the case has no tensor `{name}`"))
     }
 
-    /// A tensor on a device, in its own shape (rank `D`).
-    pub(crate) fn tensor<const D: usize>(&self, name: &str, device: &Device) -> Tensor<D> {
-        let data = self.data(name);
-        let shape = data.shape.clone().try_into();
-        data.tensor(shape.unwrap_or_else(|s| panic!("`{name}` has shape {s:?}, not rank {D}")), device)
-    }
-
     /// The weight with the authors' key `key`: `param.<key>`, or generated for filler cases, where the
     /// recorded first values `check.<key>` are verified. `None` where the case has neither.
     pub(crate) fn weight(&self, key: &str, shape: &[usize]) -> Option<Data> {
@@ -206,11 +187,6 @@ impl Case {
             Ok(ratio) => self.ratios.borrow_mut().push((ratio, name.to_owned())),
             Err(message) => self.failures.borrow_mut().push(format!("{name}: {message}")),
         }
-    }
-
-    /// [`compare`](Self::compare) for a burn tensor.
-    pub(crate) fn compare_tensor<const D: usize>(&self, name: &str, ours: &Tensor<D>) {
-        self.compare(name, &Data::of(ours));
     }
 
     /// [`compare`](Self::compare) for one number.

@@ -1,6 +1,6 @@
 //! The tolerance rule: |ours − golden| ≤ max(10 · f32_err, 1e-6 + 1e-5 · max_abs).
 
-use crate::case::Data;
+use super::case::Data;
 use serde_json::Value;
 use std::collections::BTreeMap;
 

@@ -1,8 +1,9 @@
 //! Single layers: SO(2) linear, the Vector-Neuron layers, attention, feed-forward, transformer.
 
+use crate::bindings::{Bindings, Kind, Linear, Transformer};
 use crate::case::{Case, Data};
 use crate::report::{Verdict, run_case};
-use crate::vectors::{Bindings, Kind, Linear, Transformer, feature, official};
+use crate::vectors::{feature, official};
 use crate::{Outcome, Outcome::Compared, Outcome::Skipped};
 use burn::module::Module;
 use burn::tensor::{Bool, Device, Tensor, TensorData};

@@ -8,6 +8,7 @@
 //! `VENI_GOLDEN_VERBOSE` lists how much of its tolerance every tensor uses.
 
 mod baselines;
+mod bindings;
 mod case;
 mod compare;
 mod directions;
@@ -23,16 +24,19 @@ mod image_loading;
 mod layers;
 mod losses;
 mod metrics;
+mod official;
 mod report;
 mod schedules;
 mod self_test;
 mod shading;
+mod tensors;
 mod training;
 mod vectors;
 
 use burn::tensor::Device;
 use case::Case;
 use std::path::PathBuf;
+use veni::model;
 
 /// What a module says about a case that it recognises.
 pub(crate) enum Outcome {

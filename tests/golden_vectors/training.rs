@@ -1,7 +1,7 @@
 //! Three training steps of a small auto-encoder: forward, losses, backward, clipping, Adam, schedule.
 
 use crate::case::{Case, Data};
-use crate::encoder::Official;
+use crate::official::Official;
 use crate::{Outcome, Outcome::Compared, Outcome::Elsewhere, Outcome::Skipped, double, field};
 use burn::tensor::{Device, Tensor};
 use serde_json::Value;

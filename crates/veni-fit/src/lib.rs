@@ -1,116 +1,36 @@
-//! Latent optimisation without burn: the code of an image under a fixed decoder, by Levenberg–Marquardt or Adam on the latent.
+//! Latents from pictures, without burn.
 //!
-//! Every image has its own latent Z [N, 3] and log exposure s: the decoded log radiance plus s is compared with
-//! the image. s stays as it is unless it is asked to be free. An image may be a panorama, a part of one
-//! ([`FitTarget::masks`]), or a view in any directions, clipped values included.
+//! | here | what |
+//! |---|---|
+//! | [`Encoder`] | the VN-ViT in plain f32: from a panorama to the posterior over latents |
+//! | [`fit()`], [`fit_shaded`] | latent optimisation under the folded decoder, of panoramas, parts of them, photographs, lit surfaces |
+//! | [`Observation`] | from a picture to what can be fitted |
+//! | [`shade`] | what a surface looks like under distant light, and the gradient of that |
+//! | [`loss`], [`schedule`] | settings that training shares |
+//!
+//! ```no_run
+//! use veni_light::{model::Model, sphere::Equirect};
+//!
+//! let encoder = veni_fit::Encoder::new(&Model::load("model.safetensors".as_ref())?)?;
+//! let log_radiance = vec![0.0; 3 * 128 * 64];
+//! let encoded = encoder.encode(Equirect::new(128, 64), &[&log_radiance])?;
+//! println!("{:?}", encoded[0].vectors);
+//! # Ok::<(), veni_light::Error>(())
+//! ```
 
 #![forbid(unsafe_code)]
 
-mod adam;
-mod config;
-mod decoder;
-mod descent;
-mod levenberg_marquardt;
+pub mod encoder;
+mod fit;
 pub mod loss;
-mod network;
 mod observation;
-mod pixel;
-mod plateau;
 pub mod schedule;
 pub mod shade;
-mod shaded;
-mod starts;
-mod target;
-#[cfg(test)]
-mod tests;
 
-pub use config::{FitConfig, Method, Objective, Plateau};
-pub use decoder::{DecoderPasses, LatentDecoder, LatentGradient, PanoramaLoss};
+pub use encoder::{Encoded, Encoder};
+pub use fit::{
+    Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective, PanoramaLoss,
+    Plateau, best_light, best_of, fit, fit_shaded, fit_with, from_each, matching_exposure, random_starts,
+};
 pub use observation::{Observation, Picture};
-pub use shaded::{fit_shaded, matching_exposure};
-pub use starts::{Best, best_light, best_of, from_each, random_starts};
-pub use target::FitTarget;
 pub use veni_light::{Error, Result};
-
-use descent::optimise;
-use network::{ImageLoss, Network};
-use pixel::PixelLoss;
-use veni_light::latent::{Latent, Prior};
-
-/// What came out.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FitResult {
-    /// One for each image, after the last update.
-    pub latents: Vec<Latent>,
-    /// The loss before each update, prior included, averaged over the images.
-    pub losses: Vec<f64>,
-    /// The loss of each image after the last update, without the prior.
-    pub last: Vec<f64>,
-}
-
-/// Optimises one latent per image from `start`.
-///
-/// # Errors
-/// [`Error::Invalid`] if the numbers of images, masks and starts or their sizes disagree, if there are none,
-/// if the objective cannot take clipped values that are given, or if the loss is no longer finite;
-/// [`Error::Unsupported`] for an objective over whole images: [`fit_with`] takes those.
-pub fn fit(
-    decoder: &dyn LatentDecoder,
-    target: &FitTarget<'_>,
-    start: &[Latent],
-    config: &FitConfig,
-) -> Result<FitResult> {
-    fit_with(decoder, target, start, config, None, &mut |_, _| {})
-}
-
-/// [`fit`] with a loss over whole images, which [`FitConfig::objective`] names, and an observer, who is told the number of
-/// updates made and the loss, before each update.
-///
-/// # Errors
-/// As [`fit`].
-pub fn fit_with(
-    decoder: &dyn LatentDecoder,
-    target: &FitTarget<'_>,
-    start: &[Latent],
-    config: &FitConfig,
-    loss: Option<&dyn PanoramaLoss>,
-    observer: &mut dyn FnMut(u64, f64),
-) -> Result<FitResult> {
-    config.check()?;
-    target.check()?;
-    let n = decoder.latent_vectors();
-    check_starts(start, target.images.len(), n)?;
-    check_prior(target.prior, n)?;
-    let loss = match (loss, config.objective.is_pixelwise()) {
-        (_, true) => ImageLoss::Pixels(PixelLoss::of_images(config.objective, target)),
-        (Some(loss), false) => ImageLoss::Whole(loss),
-        (None, false) => {
-            return Err(Error::unsupported(
-                "this objective is a loss over whole images, which only training has; use one that looks at each pixel \
-                 alone, log-error for instance",
-            ));
-        }
-    };
-    let network = Network::new(decoder, target.directions());
-    optimise(&network, &loss, target.prior, start, config, observer)
-}
-
-fn check_starts(start: &[Latent], images: usize, n: usize) -> Result<()> {
-    if start.len() != images {
-        return Err(Error::invalid(format!("{images} images and {} latents to start from", start.len())));
-    }
-    if let Some(wrong) = start.iter().find(|z| z.vectors.len() != n) {
-        return Err(Error::invalid(format!(
-            "a start has {} vectors, the decoder takes {n}",
-            wrong.vectors.len()
-        )));
-    }
-    start.iter().try_for_each(Latent::check_finite)
-}
-
-fn check_prior(prior: Option<&Prior>, n: usize) -> Result<()> {
-    match prior.map(Prior::latent_vectors) {
-        Some(m) if m != n => Err(Error::invalid(format!("a prior of {m} vectors, the decoder takes {n}"))),
-        _ => Ok(()),
-    }
-}

@@ -2,7 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use super::FitTarget;
+use crate::FitTarget;
 use veni_image::LUMINANCE;
 use veni_image::Panorama;
 use veni_light::sphere::{Equirect, View};

@@ -33,9 +33,9 @@ pub type Evaluation = (f64, Vec<[f32; 3]>, f64);
 /// what the decoder gives for [`Equirect::directions`]. A fit multiplies the gradient with the decoder's own:
 ///
 /// ```
-/// # use veni_core::shade::*;
-/// # use veni_core::sphere::Equirect;
-/// # fn main() -> veni_core::Result<()> {
+/// # use veni_fit::shade::*;
+/// # use veni_light::sphere::Equirect;
+/// # fn main() -> veni_light::Result<()> {
 /// let grid = Equirect::new(16, 8);
 /// let ball = ([0.0; 3], 1.0);
 /// let camera = Camera::framing(ball, [0.0; 2], REFERENCE_FIELD_OF_VIEW, [24, 24], 0.05)?;

@@ -3,8 +3,8 @@
 use veni_light::field::{Curved, NormalEquations};
 use veni_light::latent::Latent;
 
-use crate::decoder::{DecoderPasses, FoldedPasses, LatentDecoder, LatentGradient, PanoramaLoss};
-use crate::pixel::PixelLoss;
+use super::decoder::{DecoderPasses, FoldedPasses, LatentDecoder, LatentGradient, PanoramaLoss};
+use super::pixel::PixelLoss;
 use crate::shade::ShadedImage;
 use crate::{Error, Result};
 
