@@ -10,8 +10,11 @@ root=$PWD
 work=$(mktemp -d)
 trap 'rm -rf "$work"; [[ -z ${worktree:-} ]] || git worktree remove --force "$worktree"' EXIT
 
-cargo build --release -p veni-cli
-after=${VENI_AFTER:-${CARGO_TARGET_DIR:-target}/release/veni-cli}
+after=${VENI_AFTER:-}
+if [[ -z $after ]]; then
+    cargo build --release -p veni-cli
+    after=${CARGO_TARGET_DIR:-target}/release/veni-cli
+fi
 before=${VENI_BEFORE:-}
 if [[ -z $before ]]; then
     worktree=$work/tree
@@ -24,10 +27,10 @@ panoramas=("$root"/assets/panoramas/*/*.exr)
 # Everything one binary makes, in the current folder. Paths are relative: they end up in files.
 make_all() {
     local cli=$1
-    "$cli" bake --device cpu --quiet --seed 1 --count 20 --out-dir bake --format exr,hdr,png --size 256x128 >bake.txt
-    "$cli" encode --quiet "${panoramas[@]}" --out-dir encode >encode.txt
-    "$cli" fit --quiet "${panoramas[@]}" --out-dir fit >fit.txt
-    "$cli" synth --quiet --count 20 --seed 1 -o synth >synth.txt
+    "$cli" bake --device cpu --quiet --seed 1 --count 20 --out-dir bake --format exr,hdr,png --size 256x128 >/dev/null
+    "$cli" encode --quiet "${panoramas[@]}" --out-dir encode >/dev/null
+    "$cli" fit --quiet "${panoramas[@]}" --out-dir fit >/dev/null
+    "$cli" synth --quiet --count 20 --seed 1 -o synth >/dev/null
     for preset in tiny small; do
         "$cli" train --quiet --data "$root/assets/panoramas" --preset $preset --steps 20 --out "train-$preset" >/dev/null
         # provenance has times and commits; the weights and the optimiser's state are what counts

@@ -79,9 +79,9 @@ mod tests {
     #[test]
     fn the_true_light_is_a_perfect_fit_and_a_near_one_is_drawn_to_it() {
         let decoder = decoder();
-        let image = [ball(1, 0.4)];
-        let config = FitConfig { prior: 0.0, free_exposure: true, ..FitConfig::light() }.in_steps(600);
-        let truth = Latent { log_exposure: 0.4, ..latent(1) };
+        let image = [ball(6, 0.4)];
+        let config = FitConfig { prior: 0.0, free_exposure: true, ..FitConfig::light() };
+        let truth = Latent { log_exposure: 0.4, ..latent(6) };
         let none = FitConfig { steps: 0, ..config };
         let exact =
             fit_shaded(&decoder, &image, None, std::slice::from_ref(&truth), &none, &mut |_, _| {}).unwrap();
@@ -91,8 +91,8 @@ mod tests {
         near.log_exposure = 0.0;
         let mut calls = 0;
         let found = fit_shaded(&decoder, &image, None, &[near], &config, &mut |_, _| calls += 1).unwrap();
-        assert!(found.last[0] < 0.01 * found.losses[0], "{} of {}", found.last[0], found.losses[0]);
-        assert!((found.latents[0].log_exposure - 0.4).abs() < 0.1 && calls == 600);
+        assert!(found.last[0] < 1e-6 * found.losses[0], "{} of {}", found.last[0], found.losses[0]);
+        assert!((found.latents[0].log_exposure - 0.4).abs() < 1e-2 && calls == 400);
     }
 
     #[test]
