@@ -29,7 +29,7 @@ from graphs import GRAPHS
 from report import Report, difference
 
 ROOT = Path(__file__).resolve().parents[2]
-MODEL = ROOT / "assets" / "veni-27.safetensors"
+MODEL = ROOT / "crates" / "veni-light" / "assets" / "veni-27.safetensors"
 F64 = torch.float64
 
 

@@ -27,7 +27,7 @@ const LOG_EXPOSURE: f32 = -1.1022649;
 #[test]
 fn the_latent_is_that_of_the_trained_network() {
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets");
-    let model = Model::load(assets.join("veni-27.safetensors")).expect("the shipped model");
+    let model = Model::load(assets.join("../crates/veni-light/assets/veni-27.safetensors")).expect("the shipped model");
     let panorama = Panorama::read(assets.join("panoramas/val/mud_road_puresky.exr")).expect("a panorama");
     let grid = Equirect::new(128, 64);
     let mut log_radiance = panorama.resample(grid).log().into_flattened();

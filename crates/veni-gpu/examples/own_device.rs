@@ -258,7 +258,7 @@ fn largest_difference(a: &[f32; 3], b: &[f32; 3]) -> f32 {
 }
 
 fn arguments() -> Result<(PathBuf, u64)> {
-    let mut model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/veni-27.safetensors");
+    let mut model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../veni-light/assets/veni-27.safetensors");
     let mut seed = 7;
     let mut args = std::env::args().skip(1);
     while let Some(name) = args.next() {

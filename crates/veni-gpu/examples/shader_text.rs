@@ -21,7 +21,7 @@ const WORKGROUP_MEMORY: u32 = 16 << 10;
 const USAGE: &str = "shader_text [--function | --module | --kernel] [--model FILE]";
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/veni-27.safetensors");
+    let mut path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../veni-light/assets/veni-27.safetensors");
     let mut what = String::from("--function");
     let mut args = std::env::args().skip(1);
     while let Some(arg) = args.next() {

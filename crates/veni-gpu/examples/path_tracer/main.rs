@@ -327,7 +327,7 @@ struct Options {
 
 impl Options {
     fn from_args() -> Result<Self> {
-        let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/veni-27.safetensors");
+        let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../veni-light/assets/veni-27.safetensors");
         let out = PathBuf::from("path_tracer.png");
         let mut options = Self { seed: 7, size: [192, 108], samples: 16, turn: None, model, out };
         let mut args = std::env::args().skip(1);

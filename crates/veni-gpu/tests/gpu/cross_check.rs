@@ -72,7 +72,7 @@ fn too_wide_to_be_tiled() {
 #[test]
 fn pretrained_model_with_all_the_device_has() {
     let Some(gpu) = util::rich() else { return };
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/veni-27.safetensors");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../veni-light/assets/veni-27.safetensors");
     let model = Model::load(path).unwrap();
     // stored in f16: packed so where the device can
     for choice in [KernelChoice::Auto, KernelChoice::SingleWeights] {
