@@ -8,6 +8,7 @@
 #[cfg(feature = "learn")]
 mod allocator;
 mod args;
+mod cli;
 mod commands;
 mod device;
 #[cfg(feature = "learn")]
@@ -29,9 +30,9 @@ use clap::Parser;
 use crate::report::{Outcome, Report};
 
 fn main() -> ExitCode {
-    let cli = args::Cli::parse();
+    let cli = cli::Cli::parse();
     let report = Report::new(cli.json, cli.quiet);
-    match commands::run(cli.command, report) {
+    match cli.command.run(report) {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,
         Ok(Outcome::Negative) => ExitCode::from(1),
         Err(error) if report::is_closed_pipe(&error) => ExitCode::SUCCESS,

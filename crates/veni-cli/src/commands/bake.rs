@@ -14,7 +14,7 @@ use veni_core::panorama::{Precision, WriteFormat, WriteOptions};
 use crate::args::{DecodeDevice, Force, ModelArgs};
 use crate::device::Device;
 use crate::output::{self, with_remedy};
-use crate::picture::{Picture, preview_tonemap};
+use crate::picture::{FrameName, Layout, Picture, preview_tonemap};
 use crate::progress::Progress;
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
@@ -112,29 +112,6 @@ pub(crate) struct Bake {
 
     #[command(flatten)]
     many: Many,
-}
-
-/// How directions are laid out in the image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Layout {
-    /// Latitude and longitude, twice as wide as high
-    #[default]
-    Equirect,
-    /// Six faces, one below the other
-    Cubemap,
-}
-
-/// The frames by the names that are typed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum FrameName {
-    /// z up, the image's centre looks along +x (also native to this program)
-    Blender,
-    /// y up, centre +x (glTF, three.js)
-    Gltf,
-    /// y up, centre +z (OpenEXR, USD)
-    Openexr,
-    /// y up, centre -z
-    Bevy,
 }
 
 impl Bake {

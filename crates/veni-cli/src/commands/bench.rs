@@ -5,9 +5,8 @@ mod cpu;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod measure;
+mod subject;
 mod table;
-
-use std::time::Duration;
 
 use anyhow::Result;
 use clap::Args;
@@ -18,6 +17,7 @@ use crate::report::{self, Outcome, Report, is_closed_pipe};
 use crate::size::Size;
 use cases::Case;
 use measure::Stopwatch;
+use subject::Subject;
 use table::{Row, Table};
 
 /// Measure how fast this machine bakes, on the CPU and on every graphics device
@@ -52,24 +52,6 @@ pub(crate) struct Bench {
     /// Also what takes longer than ten seconds, measured once
     #[arg(long)]
     all: bool,
-}
-
-/// Something that bakes.
-trait Subject {
-    /// What to call it in results.
-    fn name(&self) -> &str;
-
-    /// Its own rate of f32 multiply-adds, floating-point operations per second.
-    fn multiply_add_rate(&mut self) -> Result<f64>;
-
-    /// Readies a latent of a model.
-    fn load(&mut self, case: &Case) -> Result<Box<dyn Bakes>>;
-}
-
-/// A latent, ready to be baked.
-trait Bakes {
-    /// Bakes a panorama: how long that took, preparations for this size not included.
-    fn bake(&mut self, grid: Equirect) -> Result<Duration>;
 }
 
 impl Bench {

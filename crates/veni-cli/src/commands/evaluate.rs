@@ -27,6 +27,7 @@ use crate::output::with_remedy;
 use crate::report::{Outcome, Report, to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
+use inputs::BaselineName;
 use watch::Bars;
 
 /// The fewest rows on which structural similarity is defined.
@@ -143,19 +144,6 @@ pub(crate) enum Protocol {
     InverseRendering,
     /// All of them, with published numbers beside ours
     Paper,
-}
-
-/// Classical bases.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum BaselineName {
-    /// No baseline
-    None,
-    /// Spherical harmonics of log radiance, weighted least squares
-    Sh,
-    /// Spherical Gaussians of either sign in log radiance
-    Sg,
-    /// A mixture of positive spherical Gaussians in radiance
-    Mixture,
 }
 
 /// How tables are written.

@@ -4,13 +4,13 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_mangen::Man as Page;
 use serde_json::json;
 use veni_core::Error;
 use veni_core::output::{Overwrite, refuse_existing, write_atomic};
 
-use crate::args::{Cli, Force};
+use crate::args::Force;
 use crate::report::{Outcome, Report, to_stdout};
 
 /// Print the manual page, or write one per command into a folder
@@ -28,8 +28,9 @@ pub(crate) struct Man {
 }
 
 impl Man {
-    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
-        let mut cli = Cli::command().disable_help_subcommand(true);
+    /// For the command line `cli`.
+    pub(crate) fn run(self, cli: Command, report: Report) -> Result<Outcome> {
+        let mut cli = cli.disable_help_subcommand(true);
         cli.build();
         let Some(folder) = self.folder else {
             let text = render(cli)?;
@@ -67,7 +68,7 @@ impl Man {
     }
 }
 
-fn render(command: clap::Command) -> Result<Vec<u8>> {
+fn render(command: Command) -> Result<Vec<u8>> {
     let mut text = Vec::new();
     Page::new(command).render(&mut text)?;
     Ok(text)

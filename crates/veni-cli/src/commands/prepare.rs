@@ -2,6 +2,7 @@
 
 mod contact;
 mod expand;
+mod network;
 mod place;
 mod record;
 mod report;

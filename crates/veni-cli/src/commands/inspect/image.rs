@@ -7,8 +7,9 @@ use serde_json::json;
 use veni_core::latent::Latent;
 use veni_core::panorama::{self, Panorama};
 
+use super::facts::Facts;
+use super::latent;
 use super::statistics::Statistics;
-use super::{Facts, latent};
 use crate::output::{CUBE_FACES, FRAME, LATENT};
 
 pub(super) fn describe(path: &Path) -> Result<Facts> {

@@ -2,23 +2,23 @@
 
 #[cfg(feature = "gpu")]
 mod devices;
+mod facts;
 mod image;
 mod latent;
 mod model;
 pub(crate) mod run;
 mod statistics;
 
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use serde_json::{Map, Value};
 use veni_core::Error;
 
 use crate::report::{self, Outcome, Report, is_closed_pipe};
+use facts::Facts;
 
 /// Show what is inside models, latents, images and training runs, or the graphics devices
 #[derive(Args, Debug)]
@@ -74,58 +74,6 @@ fn devices(report: Report) -> Result<Outcome> {
 #[cfg(not(feature = "gpu"))]
 fn devices(_: Report) -> Result<Outcome> {
     bail!("inspect --devices: {}", crate::device::NO_GPU)
-}
-
-/// What a path or a device turned out to be, and its properties in the order to show them.
-pub(super) struct Facts {
-    kind: &'static str,
-    rows: Vec<(&'static str, String)>,
-    json: Map<String, Value>,
-}
-
-impl Facts {
-    pub(super) fn new(kind: &'static str) -> Self {
-        Self { kind, rows: Vec::new(), json: Map::new() }
-    }
-
-    /// A property: a line of text, and the same for machines.
-    pub(super) fn add(&mut self, name: &'static str, text: impl Into<String>, json: impl Into<Value>) {
-        self.rows.push((name, text.into()));
-        self.json.insert(name.replace([' ', '-'], "_"), json.into());
-    }
-
-    /// A property whose name comes from the file; machines find it under `attributes`.
-    pub(super) fn attribute(&mut self, name: &str, value: &str) {
-        let all = self.json.entry("attributes").or_insert_with(|| Value::Object(Map::new()));
-        if let Value::Object(all) = all {
-            all.insert(name.to_owned(), value.into());
-        }
-        self.rows.push(("attribute", format!("{name} = {value}")));
-    }
-
-    pub(super) fn has(&self, name: &str) -> bool {
-        self.json.contains_key(name)
-    }
-
-    /// All of it below a title: "name: kind".
-    fn text(&self, name: &str) -> String {
-        let mut text = format!("{name}: {}", self.kind);
-        let width = self.rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-        for (name, value) in &self.rows {
-            // writing to a String cannot fail
-            let _ = write!(text, "\n  {name:width$}  {value}");
-        }
-        text
-    }
-
-    /// All of it as one object, whose first field `key` is the name.
-    fn json(&self, key: &str, name: &str) -> Value {
-        let mut object = Map::new();
-        object.insert(key.into(), name.into());
-        object.insert("kind".into(), self.kind.into());
-        object.extend(self.json.clone());
-        object.into()
-    }
 }
 
 fn describe(path: &Path) -> Result<Facts> {

@@ -7,7 +7,7 @@ use veni_core::panorama::Sanitised;
 use veni_core::panorama::expand::network::Estimate;
 use veni_core::prepare::{Examined, Fingerprint, Split, capture};
 
-use super::expand::NetworkSettings;
+use super::network::NetworkSettings;
 use super::scan::Source;
 
 /// One examined file.

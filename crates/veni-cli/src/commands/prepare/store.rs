@@ -20,7 +20,7 @@ use veni_core::output::{Overwrite, write_atomic};
 use veni_core::panorama::Transfer;
 use veni_core::prepare::Expander;
 
-use super::expand::NetworkSettings;
+use super::network::NetworkSettings;
 use super::record::Record;
 use super::scan::Source;
 use crate::output::{PROBE, writable};

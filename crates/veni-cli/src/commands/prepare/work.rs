@@ -9,7 +9,7 @@ use veni_core::output::Overwrite;
 use veni_core::panorama::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions};
 use veni_core::prepare::{Examined, PrepareConfig, content_hash, examine};
 
-use super::expand::NetworkSettings;
+use super::network::NetworkSettings;
 use super::record::{Facts, Fate, Record};
 use super::scan::Source;
 use super::store::Store;
