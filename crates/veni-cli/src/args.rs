@@ -13,6 +13,17 @@ pub(crate) struct ModelArgs {
     pub(crate) model: Option<PathBuf>,
 }
 
+/// Model and device of what is baked.
+#[derive(Args, Debug)]
+pub(crate) struct Decoding {
+    #[command(flatten)]
+    pub(crate) model: ModelArgs,
+
+    /// What decodes
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) device: DecodeDevice,
+}
+
 /// Whether existing files may be replaced.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Force {

@@ -12,8 +12,12 @@ mod cli;
 mod commands;
 mod device;
 #[cfg(feature = "learn")]
+mod latent_files;
+#[cfg(feature = "learn")]
 mod loading;
+mod numbers;
 mod output;
+mod part;
 mod picture;
 mod progress;
 mod report;

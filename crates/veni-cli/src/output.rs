@@ -11,9 +11,6 @@ use veni_core::output::{Overwrite, process_token, refuse_existing};
 use veni_core::panorama::{WriteOptions, write_rows};
 use veni_core::sphere::Equirect;
 
-#[cfg(feature = "learn")]
-use crate::shard::Shard;
-
 /// Attribute of a baked image: the latent's JSON.
 pub(crate) const LATENT: &str = "veni:latent";
 /// Attribute: hash of the model that decoded it.
@@ -47,36 +44,6 @@ pub(crate) fn check(paths: &[PathBuf], extensions: &[&str], overwrite: Overwrite
         }
     }
     Ok(())
-}
-
-/// Where the results for `inputs` go: to the single `output`, or into `folder` under the inputs' names with another
-/// extension; nowhere (stdout) if neither is given. Those of this process's share are checked before any work; the
-/// names of all of them must differ.
-#[cfg(feature = "learn")]
-pub(crate) fn one_per_input(
-    inputs: &[PathBuf],
-    output: Option<&PathBuf>,
-    folder: Option<&PathBuf>,
-    extension: &str,
-    overwrite: Overwrite,
-    shard: Shard,
-) -> Result<Vec<PathBuf>> {
-    let names = match (output, folder) {
-        (Some(_), _) if inputs.len() > 1 => {
-            bail!("-o names one file for {} inputs: name a folder with --out-dir DIR", inputs.len())
-        }
-        (Some(output), _) => vec![output.clone()],
-        (None, None) => return Ok(Vec::new()),
-        (None, Some(folder)) => inputs.iter().map(|i| named(folder, i, extension)).collect::<Result<_>>()?,
-    };
-    check_distinct(&names)?;
-    let own = shard.own(&names);
-    if let Some(folder) = folder {
-        own.iter().try_for_each(|f| refuse_existing(f, overwrite))?;
-        create_folder(folder)?;
-    }
-    check(&own, &[extension], overwrite)?;
-    Ok(names)
 }
 
 /// Creates a folder for results unless it is there; several processes may do so at once.

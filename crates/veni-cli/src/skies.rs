@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use veni_core::latent::Latent;
 use veni_core::output::{Overwrite, refuse_existing};
 
+use crate::numbers::{finite, stops};
 use crate::output;
 use crate::report::Report;
 use crate::shard::Shard;
@@ -48,6 +50,30 @@ pub(crate) struct Many {
 
     #[command(flatten)]
     pub(crate) shard: Shard,
+}
+
+/// What is done to a sky before it is used.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Change {
+    /// Turn the sky about the vertical axis, counter-clockwise seen from above
+    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = finite, allow_hyphen_values = true,
+        hide_default_value = true)]
+    pub(crate) turn: f64,
+
+    /// Make the sky brighter (or, negative, darker) by factors of two
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = stops, allow_hyphen_values = true,
+        hide_default_value = true)]
+    pub(crate) exposure: f64,
+}
+
+impl Change {
+    /// The changed latent: what files record.
+    pub(crate) fn of(self, latent: &Latent) -> Latent {
+        let mut latent =
+            if self.turn == 0.0 { latent.clone() } else { latent.turned(self.turn.to_radians()) };
+        latent.log_exposure += (self.exposure * std::f64::consts::LN_2) as f32;
+        latent
+    }
 }
 
 /// Formats by extension.

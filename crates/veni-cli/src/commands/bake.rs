@@ -11,21 +11,18 @@ use veni_core::output::Overwrite;
 use veni_core::panorama::tonemap::{Curve, Tonemap};
 use veni_core::panorama::{Precision, WriteFormat, WriteOptions};
 
-use crate::args::{DecodeDevice, Force, ModelArgs};
+use crate::args::{Decoding, Force};
 use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::picture::{FrameName, Layout, Picture, preview_tonemap};
 use crate::progress::Progress;
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
-use crate::skies::{self, Job, Many, Sky, Target};
+use crate::skies::{self, Change, Job, Many, Sky, Target};
 use crate::source::{self, Loaded};
 
 /// The largest finite half-precision number.
 const HALF_MAX: f32 = 65504.0;
-
-/// Largest |exposure|. Light that is 2^64 brighter than a sky is no light, and close to what an f32 can hold.
-const MAX_STOPS: f64 = 64.0;
 
 /// Stands where no PNG is written.
 const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
@@ -74,15 +71,8 @@ pub(crate) struct Bake {
     #[arg(long, value_name = "W|WxH")]
     size: Option<Size>,
 
-    /// Turn the scene about the vertical axis, counter-clockwise seen from above
-    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = finite, allow_hyphen_values = true,
-        hide_default_value = true)]
-    turn: f64,
-
-    /// Make it brighter (or, negative, darker) by factors of two
-    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = stops, allow_hyphen_values = true,
-        hide_default_value = true)]
-    exposure: f64,
+    #[command(flatten)]
+    change: Change,
 
     /// EXR in half precision; fails where radiance exceeds 65504 [default: half if that holds it, else float]
     #[arg(long, conflicts_with = "float")]
@@ -101,11 +91,7 @@ pub(crate) struct Bake {
     frame: Option<FrameName>,
 
     #[command(flatten)]
-    model: ModelArgs,
-
-    /// What decodes
-    #[arg(long, value_enum, default_value_t)]
-    device: DecodeDevice,
+    decoding: Decoding,
 
     #[command(flatten)]
     force: Force,
@@ -123,18 +109,10 @@ impl Bake {
             Sky::File(path) => Some(path.as_path()),
             Sky::Seed(_) => None,
         });
-        let loaded = source::model_of(&self.model, files)?;
+        let loaded = source::model_of(&self.decoding.model, files)?;
         loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
-        let device = Device::open(self.device, &loaded.model, report)?;
-        let mut failed = Vec::new();
-        for job in jobs {
-            match self.one(&job, &picture, &loaded, &device, report) {
-                Ok(()) => {}
-                Err(error) if report::is_closed_pipe(&error) => return Err(error),
-                Err(error) => failed.push(error),
-            }
-        }
-        report::last_of(failed)
+        let device = Device::open(self.decoding.device, &loaded.model, report)?;
+        report::each(jobs, |job| self.one(&job, &picture, &loaded, &device, report))
     }
 
     /// One sky to its files.
@@ -151,7 +129,7 @@ impl Bake {
             Sky::File(path) => source::from_file(path, loaded, report)?,
             Sky::Seed(seed) => source::seeded(&loaded.model, *seed),
         };
-        let latent = self.changed(&named);
+        let latent = self.change.of(&named);
         let started = Instant::now();
         let baker = device.condition(&latent)?;
         let png = job.files.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")));
@@ -214,14 +192,6 @@ impl Bake {
         self.report(&job.files, picture, &latent, precision, device.name(), started, report)
     }
 
-    /// The latent with `--turn` and `--exposure` in it: what the files record.
-    fn changed(&self, latent: &Latent) -> Latent {
-        let mut latent =
-            if self.turn == 0.0 { latent.clone() } else { latent.turned(self.turn.to_radians()) };
-        latent.log_exposure += (self.exposure * std::f64::consts::LN_2) as f32;
-        latent
-    }
-
     #[allow(clippy::too_many_arguments, reason = "all that is said of a file")]
     fn report(
         &self,
@@ -262,19 +232,4 @@ impl Bake {
 
 fn has_exr(files: &[(PathBuf, WriteOptions)]) -> bool {
     files.iter().any(|(_, options)| matches!(options.format, WriteFormat::Exr(_)))
-}
-
-fn finite(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(v) if v.is_finite() => Ok(v),
-        Ok(_) => Err("the number must be finite".to_owned()),
-        Err(_) => Err("not a number".to_owned()),
-    }
-}
-
-fn stops(text: &str) -> Result<f64, String> {
-    match finite(text)? {
-        v if v.abs() <= MAX_STOPS => Ok(v),
-        _ => Err(format!("more than {MAX_STOPS} stops either way is beyond the range of floats")),
-    }
 }

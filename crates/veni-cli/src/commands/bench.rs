@@ -8,12 +8,12 @@ mod measure;
 mod subject;
 mod table;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use veni_core::sphere::Equirect;
 
 use crate::args::ModelArgs;
-use crate::report::{self, Outcome, Report, is_closed_pipe};
+use crate::report::{self, Outcome, Report};
 use crate::size::Size;
 use cases::Case;
 use measure::Stopwatch;
@@ -68,16 +68,11 @@ impl Bench {
         let mut subjects = subjects(report);
         let table = Table::new(subjects.iter().map(|s| s.name()), &cases);
         table.head(report)?;
-        let mut failed = Vec::new();
-        for subject in &mut subjects {
-            match self.measure(subject.as_mut(), &cases, &grids, &table, report) {
-                Ok(()) => {}
-                Err(error) if is_closed_pipe(&error) => return Err(error),
-                // one device must not hide the others
-                Err(error) => failed.push(error.context(subject.name().to_owned())),
-            }
-        }
-        report::last_of(failed)
+        // one device must not hide the others
+        report::each(&mut subjects, |subject| {
+            let measured = self.measure(subject.as_mut(), &cases, &grids, &table, report);
+            measured.with_context(|| subject.name().to_owned())
+        })
     }
 
     fn measure(

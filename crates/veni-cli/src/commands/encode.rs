@@ -11,6 +11,7 @@ use veni_core::panorama::tonemap::Tonemap;
 use veni_core::sphere::Equirect;
 
 use crate::args::{Force, ModelArgs};
+use crate::latent_files::LatentFiles;
 use crate::output::{self, with_remedy};
 use crate::progress::Progress;
 use crate::report::{self, Outcome, Report, to_stdout};
@@ -41,13 +42,8 @@ pub(crate) struct Encode {
     #[arg(required = true, value_name = "PANORAMA")]
     panoramas: Vec<PathBuf>,
 
-    /// Latent file to write, for a single panorama
-    #[arg(long, short, value_name = "OUT.json", conflicts_with = "out_dir")]
-    output: Option<PathBuf>,
-
-    /// Folder for the latents, created if missing; each is named after its panorama
-    #[arg(long, value_name = "DIR")]
-    out_dir: Option<PathBuf>,
+    #[command(flatten)]
+    target: LatentFiles,
 
     /// Also write a PNG: panorama | reconstruction, one pair per row
     #[arg(long, value_name = "OUT.png")]
@@ -109,8 +105,7 @@ impl Encode {
         if let Some(preview) = &self.preview {
             output::check(std::slice::from_ref(preview), &["png"], overwrite)?;
         }
-        let (output, folder) = (self.output.as_ref(), self.out_dir.as_ref());
-        output::one_per_input(&self.panoramas, output, folder, "json", overwrite, self.shard)
+        self.target.of(&self.panoramas, overwrite, self.shard)
     }
 }
 

@@ -24,6 +24,7 @@ use veni_core::train::config::DeviceKind;
 
 use crate::loading::Loading;
 use crate::output::with_remedy;
+use crate::part::fold;
 use crate::report::{Outcome, Report, to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
@@ -95,7 +96,7 @@ pub(crate) struct Evaluate {
 
     /// Cross-validation: the I-th of N parts of the panoramas (of train/, where there is one), which 'veni-cli train
     /// --fold I/N' held back
-    #[arg(long, value_name = "I/N")]
+    #[arg(long, value_name = "I/N", value_parser = fold)]
     fold: Option<Fold>,
 
     /// Only the first so many panoramas by name

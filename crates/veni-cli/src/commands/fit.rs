@@ -20,6 +20,7 @@ use veni_core::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
 
 use crate::args::{Force, ModelArgs};
+use crate::latent_files::{LatentFiles, source_of};
 use crate::output::{self, with_remedy};
 use crate::progress::Progress;
 use crate::report::{self, Outcome, Report, to_stdout};
@@ -57,13 +58,8 @@ pub(crate) struct Fit {
     #[command(flatten)]
     input: Input,
 
-    /// Latent file to write, for a single picture
-    #[arg(long, short, value_name = "OUT.json", conflicts_with = "out_dir")]
-    output: Option<PathBuf>,
-
-    /// Folder for the latents, created if missing; each is named after its picture
-    #[arg(long, value_name = "DIR")]
-    out_dir: Option<PathBuf>,
+    #[command(flatten)]
+    target: LatentFiles,
 
     /// Also write the whole panorama: what is known as it is, the rest from the latent (.exr, .hdr, .png; one
     /// picture)
@@ -110,8 +106,7 @@ impl Fit {
         let overwrite = Overwrite::from(self.force);
         let pictures = &self.input.pictures;
         self.check_images(overwrite)?;
-        let (output, folder) = (self.output.as_ref(), self.out_dir.as_ref());
-        let outputs = output::one_per_input(pictures, output, folder, "json", overwrite, self.shard)?;
+        let outputs = self.target.of(pictures, overwrite, self.shard)?;
         self.shard.note_idle(pictures.len(), report);
         self.settings.grid(false)?;
         let config = self.settings.config(self.shaded.normals.is_some())?;
@@ -119,15 +114,9 @@ impl Fit {
         let device = DeviceKind::Flex.device()?;
         let subject =
             Subject::new(&loaded.name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?;
-        let mut failed = Vec::new();
-        for (at, path) in pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)) {
-            match self.one(path, outputs.get(at), &subject, &config, report) {
-                Ok(()) => {}
-                Err(error) if report::is_closed_pipe(&error) => return Err(error),
-                Err(error) => failed.push(error),
-            }
-        }
-        report::last_of(failed)
+        report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
+            self.one(path, outputs.get(at), &subject, &config, report)
+        })
     }
 
     /// Refuses what could not be written after the fits.
@@ -173,8 +162,7 @@ impl Fit {
                 self.fit(path, observation, subject, config, report)?
             }
         };
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
-        fitted.best.latent.source = Some(name.unwrap_or_else(|| path.display().to_string()));
+        fitted.best.latent.source = Some(source_of(path));
         fitted.best.latent.model = Some(subject.model().hash());
         if let Some(output) = output {
             fitted.best.latent.save(output, overwrite).map_err(with_remedy)?;

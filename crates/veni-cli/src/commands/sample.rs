@@ -12,7 +12,7 @@ use veni_core::panorama::Panorama;
 use veni_core::panorama::tonemap::Tonemap;
 use veni_core::sphere::Equirect;
 
-use crate::args::{DecodeDevice, Force, ModelArgs};
+use crate::args::{Decoding, Force};
 use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::progress::Progress;
@@ -63,11 +63,7 @@ pub(crate) struct Sample {
     latents: Option<PathBuf>,
 
     #[command(flatten)]
-    model: ModelArgs,
-
-    /// What decodes
-    #[arg(long, value_enum, default_value_t)]
-    device: DecodeDevice,
+    decoding: Decoding,
 
     #[command(flatten)]
     force: Force,
@@ -117,9 +113,9 @@ impl Sample {
             bail!("--seed {}: leaves no room for {count} seeds; give a smaller one", self.seed);
         };
         let files = self.latent_files(last, overwrite)?;
-        let Loaded { model, name } = source::model(&self.model)?;
+        let Loaded { model, name } = source::model(&self.decoding.model)?;
         model.config().decoder.check_folds().map_err(|e| e.in_file(&name))?;
-        let device = Device::open(self.device, &model, report)?;
+        let device = Device::open(self.decoding.device, &model, report)?;
         let cell = Equirect::new(width, height);
         let mut sheet = Sheet::new(grid.columns, grid.rows, width, height);
         let mut progress = Progress::start(report, "sky", 0, count as u64);

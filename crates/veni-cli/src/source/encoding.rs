@@ -14,6 +14,7 @@ use veni_core::vae::Veni;
 
 use super::image::panorama;
 use super::model::Loaded;
+use crate::latent_files::source_of;
 use crate::report::Report;
 
 /// The resolution at which a panorama is encoded and scored: that of the training data of the article.
@@ -54,12 +55,11 @@ impl<'a> Encoding<'a> {
         let encoded =
             self.veni.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
         let vectors = encoded.into_iter().next().map(|e| e.vectors).unwrap_or_default();
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
         let latent = Latent {
             vectors,
             log_exposure: item.log_exposure,
             model: Some(self.loaded.model.hash()),
-            source: Some(name.unwrap_or_else(|| path.display().to_string())),
+            source: Some(source_of(path)),
         };
         let decoder = self.loaded.model.decoder().map_err(|e| e.in_file(&self.loaded.name))?;
         let field = decoder.condition(&latent).map_err(|e| e.in_file(path))?;

@@ -15,7 +15,7 @@ use veni_core::shade::{
 use veni_core::sphere::{Equirect, View};
 
 use super::input::Read;
-use crate::commands::render_probe::{albedo, fraction, lights, shininess};
+use crate::numbers::{albedo, fraction, lights, shininess};
 use crate::output::CAMERA;
 
 #[derive(Args, Debug)]

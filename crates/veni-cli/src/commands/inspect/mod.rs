@@ -17,7 +17,7 @@ use anyhow::{Result, bail};
 use clap::Args;
 use veni_core::Error;
 
-use crate::report::{self, Outcome, Report, is_closed_pipe};
+use crate::report::{self, Outcome, Report};
 use facts::Facts;
 
 /// Show what is inside models, latents, images and training runs, or the graphics devices
@@ -53,16 +53,11 @@ impl Inspect {
         if self.devices {
             return devices(report);
         }
-        let mut failed = Vec::new();
-        for path in &self.files {
+        report::each(&self.files, |path| {
             let name = path.display().to_string();
-            match describe(path) {
-                Ok(facts) => report.result(facts.text(&name), &facts.json("file", &name))?,
-                Err(error) if is_closed_pipe(&error) => return Err(error),
-                Err(error) => failed.push(error),
-            }
-        }
-        report::last_of(failed)
+            let facts = describe(path)?;
+            report.result(facts.text(&name), &facts.json("file", &name))
+        })
     }
 }
 

@@ -7,6 +7,8 @@ use veni_core::data::Fold;
 use veni_core::train::config::{DeviceKind, Devices};
 use veni_core::train::presets::Preset;
 
+use crate::part::fold;
+
 /// Train a model on HDR panoramas
 #[derive(Args, Debug)]
 #[command(
@@ -49,7 +51,7 @@ pub(crate) struct Train {
 
     /// Cross-validation: hold back the I-th of N parts of the panoramas, and validate by it instead of by val/;
     /// 'veni-cli evaluate --fold I/N' reports on it
-    #[arg(long, value_name = "I/N")]
+    #[arg(long, value_name = "I/N", value_parser = fold)]
     pub(super) fold: Option<Fold>,
 
     /// Folder of the run
