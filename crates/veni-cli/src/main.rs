@@ -13,8 +13,6 @@ mod commands;
 mod device;
 #[cfg(feature = "learn")]
 mod latent_files;
-#[cfg(feature = "learn")]
-mod loading;
 mod numbers;
 mod output;
 mod part;

@@ -15,7 +15,7 @@ use crate::args::{Decoding, Force};
 use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::picture::{FrameName, Layout, Picture, preview_tonemap};
-use crate::progress::Progress;
+use crate::progress::Bars;
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
 use crate::skies::{self, Change, Job, Many, Sky, Target};
@@ -156,11 +156,11 @@ impl Bake {
             (_, true) => (Precision::Float, false),
             _ => (Precision::Half, true),
         };
+        let bars = Bars::new(report);
         loop {
             let (files, mut too_bright) = (files(precision)?, None);
             let watch = may_change && precision == Precision::Half && has_exr(&files);
-            let mut progress = Progress::start(report, "row", 0, picture.grid().height as u64);
-            let mut done = 0;
+            bars.begin("", "row", Some(picture.grid().height as u64));
             let result = output::write_all(&files, picture.grid(), &mut |push| {
                 baker.rows(picture.directions(), &mut |row| {
                     if watch
@@ -169,12 +169,11 @@ impl Bake {
                         too_bright = Some(*v);
                         return Err(veni_core::Error::invalid("beyond the range of half precision"));
                     }
-                    done += 1;
-                    progress.set(done, String::new);
+                    bars.add(1);
                     push(row)
                 })
             });
-            progress.finish();
+            bars.end();
             match (result, too_bright) {
                 (_, Some(value)) => {
                     report.note(format_args!(

@@ -13,7 +13,7 @@ use veni_core::sphere::Equirect;
 use crate::args::{Force, ModelArgs};
 use crate::latent_files::LatentFiles;
 use crate::output::{self, with_remedy};
-use crate::progress::Progress;
+use crate::progress::Bars;
 use crate::report::{self, Outcome, Report, to_stdout};
 use crate::shard::Shard;
 use crate::sheet::Sheet;
@@ -69,9 +69,10 @@ impl Encode {
             self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
         self.shard.note_idle(self.panoramas.len(), report);
         let own: Vec<_> = self.panoramas.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)).collect();
-        let mut progress = Progress::start(report, "panorama", 0, own.len() as u64);
+        let bars = Bars::new(report);
+        bars.begin("", "panorama", Some(own.len() as u64));
         let mut failed = Vec::new();
-        for (done, (at, path)) in (1..).zip(own) {
+        for (at, path) in own {
             let encode = || -> Result<Encoded> {
                 let encoded = encoding.encode_file(path, report)?;
                 if let Some(output) = outputs.get(at) {
@@ -88,9 +89,9 @@ impl Encode {
                 }
                 Err(error) => failed.push(error),
             }
-            progress.set(done, String::new);
+            bars.add(1);
         }
-        progress.finish();
+        bars.end();
         if let Some((sheet, path)) = sheet.zip(self.preview.as_ref())
             && failed.len() < self.panoramas.len()
         {

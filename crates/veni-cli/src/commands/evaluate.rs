@@ -1,7 +1,6 @@
 //! `veni-cli evaluate`: the experiments of the paper on models and panoramas of one's own.
 
 mod inputs;
-mod watch;
 
 use std::path::PathBuf;
 
@@ -22,14 +21,13 @@ use veni_core::output::{Overwrite, write_atomic};
 use veni_core::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
 
-use crate::loading::Loading;
 use crate::output::with_remedy;
 use crate::part::fold;
+use crate::progress::Bars;
 use crate::report::{Outcome, Report, to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
 use inputs::BaselineName;
-use watch::Bars;
 
 /// The fewest rows on which structural similarity is defined.
 const MIN_HEIGHT: usize = 8;
@@ -187,12 +185,12 @@ impl Evaluate {
         let subjects = inputs::subjects(&self.models, device)?;
         let lpips =
             if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
-        let loading = Loading::new(report);
-        let data = Dataset::load_heard(&files, grid, &|done, all| loading.set(done, all));
-        loading.finish();
+        let bars = Bars::new(report);
+        let data = Dataset::load_heard(&files, grid, &|done, all| bars.loading(done, all));
+        bars.end();
         let data = data?;
         inputs::create_folder(&self.out)?;
-        let (store, figures, bars) = (Store::new(&self.out), self.out.join("figures"), Bars::new(report));
+        let (store, figures) = (Store::new(&self.out), self.out.join("figures"));
         let settings =
             Settings { seed: self.seed, quick: self.quick, pairs: self.pairs, frames: self.frames };
         let bases = inputs::bases(&self.baselines, &subjects)?;
@@ -210,7 +208,7 @@ impl Evaluate {
         if self.shard.is_part() {
             let (at, of) = self.shard.place();
             let kept = self.protocol.keep(&evaluation, Share { at, of }).map_err(with_remedy);
-            bars.finish();
+            bars.end();
             kept?;
             let (out, shard) = (self.out.display(), self.shard);
             let human =
@@ -219,7 +217,7 @@ impl Evaluate {
             return Ok(Outcome::Fine);
         }
         let found = self.protocol.run(&evaluation, &published).map_err(with_remedy);
-        bars.finish();
+        bars.end();
         self.show(&found?, report)?;
         Ok(Outcome::Fine)
     }

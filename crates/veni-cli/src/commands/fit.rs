@@ -22,7 +22,7 @@ use veni_core::train::config::DeviceKind;
 use crate::args::{Force, ModelArgs};
 use crate::latent_files::{LatentFiles, source_of};
 use crate::output::{self, with_remedy};
-use crate::progress::Progress;
+use crate::progress::Bars;
 use crate::report::{self, Outcome, Report, to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
@@ -199,14 +199,15 @@ impl Fit {
         let vectors = subject.latent_vectors();
         let config = self.settings.adapted(*config, partial, vectors);
         let (total, prior) = (config.most_updates(vectors) * starts.len() as u64, subject.prior());
-        let mut progress = Progress::start(report, "step", 0, total);
+        let bars = Bars::new(report);
+        bars.begin("", "step", Some(total));
         let best = observation.with_target(|target| {
             let target = FitTarget { prior: Some(&prior), ..target.clone() };
             best_of(subject.fit_decoder(), &target, &starts, &config, &mut |step, loss| {
-                progress.set(step, || format!("loss {loss:.4}"));
+                bars.advance(step, &format!("loss {loss:.4}"));
             })
         });
-        progress.finish();
+        bars.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         let scores = match (partial, observation.clipped.is_some()) {
             (false, false) => Some(score(subject, &best.latent, &observation)?),
@@ -250,10 +251,11 @@ impl Fit {
         self.check_starts(starts.len())?;
         self.shaded.exposed(&image, picture, subject, &mut starts)?;
         let prior = subject.prior();
-        let mut progress = Progress::start(report, "step", 0, config.steps * starts.len() as u64);
-        let mut watch = |step, loss| progress.set(step, || format!("loss {loss:.4}"));
+        let bars = Bars::new(report);
+        bars.begin("", "step", Some(config.steps * starts.len() as u64));
+        let mut watch = |step, loss| bars.advance(step, &format!("loss {loss:.4}"));
         let best = best_light(subject.fit_decoder(), &image, Some(&prior), &starts, &config, &mut watch);
-        progress.finish();
+        bars.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         for latent in best.all.iter_mut().chain([&mut best.latent]) {
             latent.log_exposure = self.shaded.recorded(latent.log_exposure);

@@ -15,7 +15,7 @@ use veni_core::sphere::Equirect;
 use crate::args::{Decoding, Force};
 use crate::device::Device;
 use crate::output::{self, with_remedy};
-use crate::progress::Progress;
+use crate::progress::Bars;
 use crate::report::{Outcome, Report};
 use crate::sheet::Sheet;
 use crate::size::Size;
@@ -118,7 +118,8 @@ impl Sample {
         let device = Device::open(self.decoding.device, &model, report)?;
         let cell = Equirect::new(width, height);
         let mut sheet = Sheet::new(grid.columns, grid.rows, width, height);
-        let mut progress = Progress::start(report, "sky", 0, count as u64);
+        let bars = Bars::new(report);
+        bars.begin("", "sky", Some(count as u64));
         for (at, seed) in (self.seed..=last).enumerate() {
             let latent = source::seeded(&model, seed);
             if let Some(file) = files.get(at) {
@@ -131,9 +132,9 @@ impl Sample {
                 at / grid.columns,
                 sky.pixels().iter().map(|p| tonemap.apply_u8(*p)),
             );
-            progress.set(at as u64 + 1, String::new);
+            bars.add(1);
         }
-        progress.finish();
+        bars.end();
         sheet.write(&self.output, overwrite).map_err(with_remedy)?;
         let Grid { columns, rows } = grid;
         let human = format!(

@@ -18,7 +18,7 @@ use veni_core::synth::{Fixed, Place, Scene, SkyKind, generate};
 
 use crate::args::Force;
 use crate::output::{self, with_remedy};
-use crate::progress::{Progress, duration};
+use crate::progress::{Bars, duration};
 use crate::report::{Outcome, Report};
 use crate::shard::Shard;
 use crate::sheet::Sheet;
@@ -155,11 +155,12 @@ impl Synth {
         };
         let cells = if sheet.is_some() { self.count.min(MAX_CELLS) } else { 0 };
         let kept = Mutex::new(0u64);
-        let shared = Mutex::new((sheet, Progress::start(report, "sky", 0, count as u64), 0u64));
+        let bars = Bars::new(report);
+        bars.begin("", "sky", Some(count as u64));
+        let shared = Mutex::new(sheet);
         let finished = |index: u64, panorama: Option<&Panorama>| -> Result<()> {
-            let mut shared = shared.lock().map_err(|_| anyhow!("a thread was lost"))?;
-            let (sheet, progress, done) = &mut *shared;
-            if let (Some(sheet), Some(panorama)) = (sheet, panorama)
+            let mut sheet = shared.lock().map_err(|_| anyhow!("a thread was lost"))?;
+            if let (Some(sheet), Some(panorama)) = (sheet.as_mut(), panorama)
                 && index < cells
             {
                 let at = index as usize;
@@ -167,8 +168,7 @@ impl Synth {
                 let pixels = panorama.pixels().iter().map(|p| tonemap.apply_u8(*p));
                 sheet.place(at % COLUMNS, at / COLUMNS, pixels);
             }
-            *done += 1;
-            progress.set(*done, String::new);
+            bars.add(1);
             Ok(())
         };
         // a file that is there already only counts; the sheet needs its picture all the same
@@ -206,8 +206,8 @@ impl Synth {
             return Err(error);
         }
         let kept = kept.into_inner().map_err(|_| anyhow!("a thread was lost"))?;
-        let (sheet, progress, _) = shared.into_inner().map_err(|_| anyhow!("a thread was lost"))?;
-        progress.finish();
+        let sheet = shared.into_inner().map_err(|_| anyhow!("a thread was lost"))?;
+        bars.end();
         if let (Some(sheet), Some(path)) = (sheet, &self.sheet) {
             sheet.write(path, overwrite).map_err(with_remedy)?;
         }

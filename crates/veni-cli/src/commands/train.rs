@@ -6,7 +6,6 @@ mod config;
 mod folder;
 mod holding;
 mod resume;
-mod watch;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,12 +19,10 @@ use veni_core::train::init::Initialised;
 use veni_core::train::run::{Finish, Trainer};
 
 use crate::commands::inspect::run::{self, Best};
-use crate::loading::Loading;
 use crate::output::with_remedy;
-use crate::progress::duration;
+use crate::progress::{Bars, duration};
 use crate::report::{Outcome, Report, to_stderr};
 use command_line::shell_word;
-use watch::Watch;
 
 pub(crate) use args::Train;
 
@@ -49,9 +46,9 @@ impl Train {
             ));
         }
         let stop = stop_on_signal()?;
-        let mut watch = Watch::new(report);
-        let finish = trainer.run(&stop, &mut watch).map_err(with_remedy)?;
-        watch.finish();
+        let bars = Bars::new(report);
+        let finish = trainer.run(&stop, &mut &bars).map_err(with_remedy)?;
+        bars.end();
         let (done, total) = (trainer.steps_done(), trainer.config().steps);
         let best = run::best(&self.out)?;
         self.report(report, finish, [done, total], best.as_ref(), started)?;
@@ -69,10 +66,10 @@ impl Train {
     fn begun(&self, report: Report) -> Result<Trainer> {
         let config = self.settings()?;
         let replace = self.check_folder()?;
-        let loading = Loading::new(report);
+        let bars = Bars::new(report);
         let trainer =
-            Trainer::prepare(&self.out, config, &self.command_line(), &|done, all| loading.set(done, all));
-        loading.finish();
+            Trainer::prepare(&self.out, config, &self.command_line(), &|done, all| bars.loading(done, all));
+        bars.end();
         let trainer = trainer.map_err(with_remedy)?;
         if replace {
             // what is there goes only now, when the new data is known to be good
@@ -93,11 +90,11 @@ impl Train {
         }
         self.check_same(&stored)?;
         let holding = self.holding(&stored)?;
-        let loading = Loading::new(report);
+        let bars = Bars::new(report);
         let trainer = Trainer::resume_heard(&self.out, &self.command_line(), &holding, &|done, all| {
-            loading.set(done, all);
+            bars.loading(done, all);
         });
-        loading.finish();
+        bars.end();
         Ok(trainer?)
     }
 
