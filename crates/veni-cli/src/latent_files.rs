@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use veni_core::output::{Overwrite, refuse_existing};
+use veni_core::output::Overwrite;
 
-use crate::output::{check, check_distinct, create_folder, named};
+use crate::output::{check, check_distinct, create_folder, named, refuse_existing};
 use crate::shard::Shard;
 
 /// What latent files are called.

@@ -5,9 +5,9 @@ use std::fs::OpenOptions;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use veni_core::Error;
-use veni_core::output::{Overwrite, process_token, refuse_existing};
+use veni_core::output::{self, Overwrite, process_token};
 use veni_core::panorama::{WriteOptions, write_rows};
 use veni_core::sphere::Equirect;
 
@@ -110,10 +110,16 @@ pub(crate) fn writable(folder: &Path, wanted: &Path) -> Result<()> {
     }
 }
 
-/// Adds what to do to an error of the system while writing.
+/// Refuses a file that exists and may not be replaced, and says which option replaces it.
+pub(crate) fn refuse_existing(path: &Path, overwrite: Overwrite) -> Result<()> {
+    output::refuse_existing(path, overwrite).map_err(with_remedy)
+}
+
+/// Adds what can be done here, of which the library knows nothing, to an error while writing.
 pub(crate) fn with_remedy(error: Error) -> anyhow::Error {
     let remedy = match &error {
-        Error::Io { action: "write", cause, .. } => match cause.kind() {
+        Error::Exists { .. } => return anyhow!("{error}; --force replaces it"),
+        Error::Io { action: "write", source, .. } => match source.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
                 "free some space or name another disk"
             }
@@ -124,7 +130,7 @@ pub(crate) fn with_remedy(error: Error) -> anyhow::Error {
         },
         _ => return error.into(),
     };
-    anyhow::anyhow!("{error}; nothing was kept of this file: {remedy}")
+    anyhow!("{}; nothing was kept of this file: {remedy}", error.with_source())
 }
 
 /// Takes rows of linear radiance from the top down.

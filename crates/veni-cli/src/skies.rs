@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use veni_core::latent::Latent;
-use veni_core::output::{Overwrite, refuse_existing};
+use veni_core::output::Overwrite;
 
 use crate::numbers::{finite, stops};
 use crate::output;
@@ -141,7 +141,7 @@ pub(crate) fn jobs(
     let images = |jobs: &[Job]| jobs.iter().flat_map(|job| job.files.clone()).collect::<Vec<_>>();
     output::check_distinct(&images(&jobs))?;
     let jobs = many.shard.own(&jobs);
-    images(&jobs).iter().try_for_each(|file| refuse_existing(file, overwrite))?;
+    images(&jobs).iter().try_for_each(|file| output::refuse_existing(file, overwrite))?;
     output::create_folder(folder)?;
     output::check(&images(&jobs), &EXTENSIONS, overwrite)?;
     Ok(jobs)

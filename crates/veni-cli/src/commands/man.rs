@@ -8,9 +8,10 @@ use clap::{Args, Command};
 use clap_mangen::Man as Page;
 use serde_json::json;
 use veni_core::Error;
-use veni_core::output::{Overwrite, refuse_existing, write_atomic};
+use veni_core::output::{Overwrite, write_atomic};
 
 use crate::args::Force;
+use crate::output::{refuse_existing, with_remedy};
 use crate::report::{Outcome, Report, to_stdout};
 
 /// Print the manual page, or write one per command into a folder
@@ -59,7 +60,8 @@ impl Man {
             let text = render(command)?;
             write_atomic(&path, overwrite, |out| {
                 out.write_all(&text).map_err(|e| Error::io(&path, "write", e))
-            })?;
+            })
+            .map_err(with_remedy)?;
             files.push(path.display().to_string());
         }
         let human = format!("{} pages in {}", files.len(), folder.display());

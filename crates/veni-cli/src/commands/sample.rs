@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
 use veni_core::Error;
-use veni_core::output::{Overwrite, refuse_existing};
+use veni_core::output::Overwrite;
 use veni_core::panorama::Panorama;
 use veni_core::panorama::tonemap::Tonemap;
 use veni_core::sphere::Equirect;
@@ -174,7 +174,7 @@ impl Sample {
         let Some(folder) = &self.latents else { return Ok(Vec::new()) };
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         let files: Vec<_> = (self.seed..=last).map(|seed| folder.join(format!("sky-{seed}.json"))).collect();
-        files.iter().try_for_each(|f| refuse_existing(f, overwrite))?;
+        files.iter().try_for_each(|f| output::refuse_existing(f, overwrite))?;
         Ok(files)
     }
 }

@@ -11,8 +11,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use serde_json::json;
+use veni_core::Error;
 use veni_core::model::ModelKind;
 use veni_core::train::config::TrainConfig;
 use veni_core::train::init::Initialised;
@@ -22,6 +23,7 @@ use crate::commands::inspect::run::{self, Best};
 use crate::output::with_remedy;
 use crate::progress::{Bars, duration};
 use crate::report::{Outcome, Report, to_stderr};
+use args::TrainDevice;
 use command_line::shell_word;
 
 pub(crate) use args::Train;
@@ -70,13 +72,23 @@ impl Train {
         let trainer =
             Trainer::prepare(&self.out, config, &self.command_line(), &|done, all| bars.loading(done, all));
         bars.end();
-        let trainer = trainer.map_err(with_remedy)?;
+        let trainer = trainer.map_err(|e| self.where_to_look(e))?;
         if replace {
             // what is there goes only now, when the new data is known to be good
             self.clear()?;
         }
         trainer.begin().map_err(with_remedy)?;
         Ok(trainer)
+    }
+
+    /// Adds to an error about a graphics card that is not there where those that are stand.
+    fn where_to_look(&self, error: Error) -> anyhow::Error {
+        match error {
+            Error::Unsupported(_) if self.device == Some(TrainDevice::Wgpu) && self.devices.is_some() => {
+                anyhow!("{error}; 'veni-cli inspect --devices' lists the adapters")
+            }
+            error => with_remedy(error),
+        }
     }
 
     /// A run that exists.

@@ -10,6 +10,7 @@ use veni_core::latent::Latent;
 use veni_core::model::Model;
 use veni_core::panorama;
 
+use super::image::expandable;
 use super::model::{Loaded, embedded, model};
 use crate::args::ModelArgs;
 use crate::output::{CUBE_FACES, LATENT};
@@ -55,7 +56,7 @@ fn stored(path: &Path) -> Result<Option<Latent>> {
     if is_latent(path)? {
         return Ok(Some(Latent::load(path)?));
     }
-    let attributes = panorama::attributes(path)?;
+    let attributes = panorama::attributes(path).map_err(|e| expandable(path, e))?;
     match attributes.get(LATENT) {
         Some(text) => Latent::from_json(text)
             .map(Some)

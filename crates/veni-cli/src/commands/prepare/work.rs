@@ -68,7 +68,7 @@ fn fate(
     network: Option<&NetworkSettings>,
 ) -> Result<Fate> {
     let refused = |error: veni_core::Error| {
-        let text = error.to_string();
+        let text = error.with_source();
         let prefix = format!("{}: ", source.path.display());
         Fate::Refused(text.strip_prefix(&prefix).unwrap_or(&text).to_owned())
     };

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use veni_core::Error;
-use veni_core::output::{Overwrite, refuse_existing};
+use veni_core::output::Overwrite;
 use veni_core::panorama::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions, attributes};
 use veni_core::sphere::Equirect;
 use veni_core::synth::Scene;
 
-use crate::output::{create_folder, writable};
+use crate::output::{create_folder, refuse_existing, writable};
 
 /// Attribute of a generated panorama: its parameters as JSON.
 const SCENE: &str = "veni:scene";

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, bail};
 use veni_core::Error;
 use veni_core::train::config::{DecoderBy, TrainConfig};
 use veni_core::train::init::InitConfig;
@@ -92,5 +92,5 @@ impl Train {
 
 pub(super) fn read(path: &Path) -> Result<TrainConfig> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
-    TrainConfig::from_toml(&text).map_err(|e| anyhow!("{}", e.in_file(path)))
+    Ok(TrainConfig::from_toml(&text).map_err(|e| e.in_file(path))?)
 }

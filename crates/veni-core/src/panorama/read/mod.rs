@@ -49,7 +49,7 @@ impl ReadOptions {
             return Err(Error::invalid(format!("the header says {width} × {height}: there are no pixels")));
         }
         if width.checked_mul(height).is_none_or(|n| n > self.max_pixels) {
-            return Err(Error::invalid(format!(
+            return Err(Error::too_large(format!(
                 "the header claims {width} × {height} pixels, more than the limit of {}",
                 self.max_pixels
             )));
@@ -161,7 +161,7 @@ const LDR: &[(usize, &[u8], ImageFormat, &str)] = &[
 /// Formats that are not read: where the name of each stands.
 const FOREIGN: [(usize, &[u8], &str); 7] = [
     // with the feature `avif` found before
-    (4, b"ftypavif", "(built without --features avif) AVIF"),
+    (4, b"ftypavif", "(built without the feature avif) AVIF"),
     (4, b"ftypavis", "Animated AVIF"),
     (4, b"ftypheic", "HEIF"),
     (0, b"BM", "BMP"),
@@ -189,7 +189,7 @@ fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
     }
     if let Some((.., name)) = LDR.iter().find(|(at, magic, ..)| stands(&start, *at, magic)) {
         return Err(Error::unsupported(format!(
-            "{name} holds no high dynamic range; `veni-cli prepare` expands such panoramas into EXR files first"
+            "{name} holds no high dynamic range; expand such panoramas into EXR files first"
         )));
     }
     Err(unknown(&start, "neither an OpenEXR nor a Radiance .hdr file"))
