@@ -41,11 +41,16 @@ impl From<Force> for veni_core::output::Overwrite {
 /// What decodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DecodeDevice {
-    /// The graphics card if there is one, else the CPU; never a card emulated in software
+    #[cfg_attr(
+        feature = "gpu",
+        doc = "The graphics card if there is one, else the CPU; never a card emulated in software"
+    )]
+    #[cfg_attr(not(feature = "gpu"), doc = "The CPU: this build cannot use graphics devices")]
     #[default]
     Auto,
     /// All CPU cores
     Cpu,
     /// The first device that 'veni-cli inspect --devices' lists, a software one too
+    #[cfg_attr(not(feature = "gpu"), value(hide = true))]
     Gpu,
 }

@@ -4,6 +4,7 @@ use anyhow::Result;
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands;
+use crate::features::{GPU, LEARN, only};
 use crate::report::{Outcome, Report};
 
 /// Everything that can be typed.
@@ -12,18 +13,21 @@ use crate::report::{Outcome, Report};
     name = "veni-cli",
     version,
     about = "Natural light for renderers, from a learned prior of outdoor skies",
-    long_about = "Natural light for renderers, from a learned prior of outdoor skies.\n\n\
+    long_about = format!("Natural light for renderers, from a learned prior of outdoor skies.\n\n\
         VENI turns an HDR environment map into a few vectors (a latent) that rotate with it, and a latent \
-        back into radiance for any direction. This tool bakes skies to image files, on the graphics card if there \
-        is one, encodes panoramas, fits latents to panoramas, parts of them and photographs, trains models, shows what is inside files and measures how fast this machine is.",
-    after_help = "Results are printed on stdout, everything else on stderr.\n\
+        back into radiance for any direction. This tool bakes skies to image files, {}{}shows what is inside files \
+        and measures how fast this machine is.",
+        only(GPU, "on the graphics card if there is one, "),
+        only(LEARN, "encodes panoramas, fits latents to panoramas, parts of them and photographs, trains models, ")),
+    after_help = format!("Results are printed on stdout, everything else on stderr.\n\
         Exit codes: 0 fine; 1 ran, but stopped early or the answer is no; 2 error.\n\n\
         Examples:\n  \
         veni-cli bake --seed 7 -o sky.exr             a random sky\n  \
         veni-cli sample -o sheet.png                  sixteen random skies on one sheet\n  \
         veni-cli inspect sky.exr                      size, range, sun, the latent inside\n  \
-        veni-cli inspect --devices                    which graphics devices can bake\n\n\
+        {}\n\
         'veni-cli help COMMAND' explains a command.",
+        only(GPU, "veni-cli inspect --devices                    which graphics devices can bake\n")),
     propagate_version = true
 )]
 pub(crate) struct Cli {
@@ -85,6 +89,9 @@ impl Command {
         }
     }
 }
+
+#[cfg(test)]
+mod advice;
 
 #[cfg(test)]
 mod tests {

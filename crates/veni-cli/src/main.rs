@@ -11,6 +11,7 @@ mod args;
 mod cli;
 mod commands;
 mod device;
+mod features;
 #[cfg(feature = "learn")]
 mod latent_files;
 mod numbers;

@@ -44,6 +44,15 @@ pub fn read(folder: &Path) -> std::io::Result<Sources> {
     Ok(sources)
 }
 
+/// The texts of all strings of a Rust file, tests left out.
+pub fn strings(source: &str) -> Vec<String> {
+    let text = |token| match token {
+        tokens::Token::Text(text) => Some(text),
+        _ => None,
+    };
+    tokens::tokens(source).into_iter().filter_map(text).collect()
+}
+
 /// The module directly below the root that a file belongs to; the root's own file has none.
 pub fn top_module(file: &Path) -> Option<String> {
     let first = file.components().next()?.as_os_str().to_string_lossy().into_owned();

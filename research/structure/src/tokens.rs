@@ -1,4 +1,4 @@
-//! Just enough of Rust's grammar to find names: no comments, no literals.
+//! Just enough of Rust's grammar to find names and texts: no comments, no numbers.
 
 /// A piece of source text.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -7,6 +7,8 @@ pub(crate) enum Token {
     Word(String),
     /// `::`.
     Path,
+    /// What stands in a string.
+    Text(String),
     /// Any other character.
     Sign(char),
 }
@@ -25,8 +27,11 @@ fn all(text: &str) -> Vec<Token> {
             '/' if text.get(at + 1) == Some(&'*') => {
                 find(&text, at + 2, |rest| rest.starts_with(&['*', '/'])) + 2
             }
-            '"' => string(&text, at),
-            'r' | 'b' | 'c' if raw_string(&text, at).is_some() => raw_string(&text, at).unwrap_or(at + 1),
+            '"' | 'r' | 'b' | 'c' if any_string(&text, at).is_some() => {
+                let (string, end) = any_string(&text, at).unwrap_or_default();
+                found.push(Token::Text(string));
+                end
+            }
             '\'' => quote(&text, at),
             ':' if text.get(at + 1) == Some(&':') => {
                 found.push(Token::Path);
@@ -54,21 +59,8 @@ fn find(text: &[char], at: usize, is_it: impl Fn(&[char]) -> bool) -> usize {
     (at..text.len()).find(|k| is_it(&text[*k..])).unwrap_or(text.len())
 }
 
-/// Behind the string that begins at `at`.
-fn string(text: &[char], at: usize) -> usize {
-    let mut at = at + 1;
-    while let Some(c) = text.get(at) {
-        match c {
-            '"' => return at + 1,
-            '\\' => at += 2,
-            _ => at += 1,
-        }
-    }
-    at
-}
-
-/// Behind the raw or byte string that begins at `at`, if one does.
-fn raw_string(text: &[char], at: usize) -> Option<usize> {
+/// The string of any kind that begins at `at`, and the place behind it.
+fn any_string(text: &[char], at: usize) -> Option<(String, usize)> {
     let prefix = find(text, at, |rest| !['r', 'b', 'c'].contains(&rest[0]));
     let quote = find(text, prefix, |rest| rest[0] != '#');
     if prefix - at > 2 || text.get(quote) != Some(&'"') {
@@ -77,9 +69,32 @@ fn raw_string(text: &[char], at: usize) -> Option<usize> {
     if !text[at..prefix].contains(&'r') {
         return (quote == prefix).then(|| string(text, quote));
     }
-    let mut end = vec!['"'];
-    end.extend(vec!['#'; quote - prefix]);
-    Some(find(text, quote + 1, |rest| rest.starts_with(&end)) + end.len())
+    let mut sign = vec!['"'];
+    sign.extend(vec!['#'; quote - prefix]);
+    let end = find(text, quote + 1, |rest| rest.starts_with(&sign));
+    Some((text[quote + 1..end].iter().collect(), end + sign.len()))
+}
+
+/// The string whose first quote is at `at`, its escapes resolved as far as they change words, and the place behind it.
+fn string(text: &[char], at: usize) -> (String, usize) {
+    let (mut string, mut at) = (String::new(), at + 1);
+    while let Some(c) = text.get(at) {
+        at += 1;
+        match (c, text.get(at)) {
+            ('"', _) => break,
+            ('\\', Some('\n')) => at = find(text, at, |rest| !rest[0].is_whitespace()),
+            ('\\', Some('n')) => {
+                string.push('\n');
+                at += 1;
+            }
+            ('\\', Some(escaped)) => {
+                string.push(*escaped);
+                at += 1;
+            }
+            (c, _) => string.push(*c),
+        }
+    }
+    (string, at)
 }
 
 /// Behind a character, or behind the sign of a lifetime.
@@ -130,12 +145,22 @@ mod tests {
         let text = r##"
             // use a;
             /* use b; */
-            let s = "use \" c"; let r = r#"use " d"#; let b = b"e"; let c = '"'; let x: &'static str = 'f';
+            let s = "use \" c \
+                and"; let r = r#"use " d"#; let b = b"e"; let c = '"'; let x: &'static str = 'f';
             #[cfg(test)] mod tests { fn g() { [1; 2] } }
             #[cfg(test)] use h;
             use i::j;
         "##;
-        let words: Vec<_> = tokens(text)
+        let found = tokens(text);
+        let texts: Vec<_> = found
+            .iter()
+            .filter_map(|t| match t {
+                Token::Text(text) => Some(text.as_str()),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(texts, ["use \" c and", "use \" d", "e"]);
+        let words: Vec<_> = found
             .into_iter()
             .filter_map(|t| match t {
                 Token::Word(word) => Some(word),

@@ -13,6 +13,7 @@ use veni_core::panorama::{Precision, WriteFormat, WriteOptions};
 
 use crate::args::{Decoding, Force};
 use crate::device::Device;
+use crate::features::{GPU, LEARN, only};
 use crate::output::{self, with_remedy};
 use crate::picture::{FrameName, Layout, Picture, preview_tonemap};
 use crate::progress::Bars;
@@ -27,36 +28,41 @@ const HALF_MAX: f32 = 65504.0;
 /// Stands where no PNG is written.
 const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
 
+/// What a graphics card changes.
+const DEVICES: &str = "Devices: a graphics card bakes the same picture as the CPU to within rounding, and large ones \
+    faster; the result says what was used. It needs the card's own driver for Vulkan, Metal or Direct3D 12, and \
+    nothing else. 'veni-cli inspect --devices' lists what there is, 'veni-cli bench' measures it.\n\n";
+
 /// Bake a sky to image files
 #[derive(Args, Debug)]
 #[command(
     group = ArgGroup::new("sky").required(true),
-    long_about = "Bake a sky to image files.\n\n\
-        The sky is a latent: a latent file (JSON), an image that this program baked (its latent is inside), an HDR \
-        panorama (encoded on the fly), or a random one named by --seed. The same seed and model give the same sky \
+    long_about = format!("Bake a sky to image files.\n\n\
+        The sky is a latent: a latent file (JSON), an image that this program baked (its latent is inside), {}or a \
+        random one named by --seed. The same seed and model give the same sky \
         for ever.\n\n\
         Several skies, or --count random ones, go to --out-dir, each named after its file or seed.\n\n\
         Formats by extension: .exr (linear, half or float), .hdr (Radiance RGBE), .png (tonemapped preview). An \
         EXR or HDR file carries its latent and the model's hash, so that it can be baked again at any size.",
-    after_help = "Cube maps: six square faces stacked from top to bottom in the order +X -X +Y -Y +Z -Z of --frame, \
+        only(LEARN, "an HDR panorama (encoded on the fly), ")),
+    after_help = format!("Cube maps: six square faces stacked from top to bottom in the order +X -X +Y -Y +Z -Z of --frame, \
         each oriented as the layers of a cube texture in Vulkan, Direct3D, Metal, OpenGL and WebGPU; the attribute \
         veni:cubeFaces repeats the order. With --frame bevy, z is negated before the lookup, as Bevy's shaders do. \
         Default frame: blender (z up); gltf for cube maps (y up).\n\n\
-        Devices: a graphics card bakes the same picture as the CPU to within rounding, and large ones faster; \
-        the result says what was used. It needs the card's own driver for Vulkan, Metal or Direct3D 12, and nothing \
-        else. 'veni-cli inspect --devices' lists what there is, 'veni-cli bench' measures it.\n\n\
-        Examples:\n  \
+        {}Examples:\n  \
         veni-cli bake --seed 7 -o sky.exr                      a random sky, 1024 x 512, half precision\n  \
         veni-cli bake --seed 7 -o sky.exr -o sky.png --size 4096\n  \
         veni-cli bake sky.exr -o turned.exr --turn 90 --exposure -1\n  \
-        veni-cli bake photo.hdr -o relit.exr                   through the encoder\n  \
-        veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512\n  \
+        {}veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512\n  \
         veni-cli bake latents/*.json --out-dir skies --format exr,png\n  \
-        veni-cli bake --seed 0 --count 1000 --out-dir skies --shard 2/4    the second of four processes\n  \
-        veni-cli bake --seed 7 -o sky.exr --device cpu         the same bits whatever card there is"
+        veni-cli bake --seed 0 --count 1000 --out-dir skies --shard 2/4    the second of four processes{}",
+        only(GPU, DEVICES),
+        only(LEARN, "veni-cli bake photo.hdr -o relit.exr                   through the encoder\n  "),
+        only(GPU, "\n  veni-cli bake --seed 7 -o sky.exr --device cpu         the same bits whatever card there is"))
 )]
 pub(crate) struct Bake {
-    /// Latent files, baked images, or HDR panoramas
+    #[cfg_attr(feature = "learn", doc = "Latent files, baked images, or HDR panoramas")]
+    #[cfg_attr(not(feature = "learn"), doc = "Latent files, or baked images")]
     #[arg(group = "sky", value_name = "LATENT")]
     latents: Vec<PathBuf>,
 

@@ -13,6 +13,7 @@ use clap::Args;
 use veni_core::sphere::Equirect;
 
 use crate::args::ModelArgs;
+use crate::features::{GPU, only};
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
 use cases::Case;
@@ -20,17 +21,23 @@ use measure::Stopwatch;
 use subject::Subject;
 use table::{Row, Table};
 
-/// Measure how fast this machine bakes, on the CPU and on every graphics device
+#[cfg_attr(
+    feature = "gpu",
+    doc = "Measure how fast this machine bakes, on the CPU and on every graphics device"
+)]
+#[cfg_attr(not(feature = "gpu"), doc = "Measure how fast this machine bakes")]
 #[derive(Args, Debug)]
 #[command(
-    long_about = "Measure how fast this machine bakes, on the CPU and on every graphics device.\n\n\
+    long_about = format!("Measure how fast this machine bakes{}.\n\n\
         Each line is one device, model and size: the time of one panorama in milliseconds (the best of several, \
         within about a second), millions of directions per second, GFLOP/s (10^9 floating-point operations per \
         second), and the share of the rate of f32 multiply-adds (FMA) that the same device was measured to do at \
         most. Only the decoder's own multiply-adds count, two operations each.\n\n\
-        Only decoding is timed: no files, and on graphics devices no transfer of the pixels back. Close other \
-        programs first. A size that would take longer than ten seconds is skipped, which software devices make \
-        likely.",
+        Only decoding is timed: no files{}. Close other programs first. A size that would take longer than ten \
+        seconds is skipped{}.",
+        only(GPU, ", on the CPU and on every graphics device"),
+        only(GPU, ", and on graphics devices no transfer of the pixels back"),
+        only(GPU, ", which software devices make likely")),
     after_help = "Examples:\n  \
         veni-cli bench\n  \
         veni-cli bench --sizes 1024x512 --latent-vectors 9,49,100\n  \

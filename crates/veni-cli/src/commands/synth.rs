@@ -17,6 +17,7 @@ use veni_core::sphere::Equirect;
 use veni_core::synth::{Fixed, Place, Scene, SkyKind, generate};
 
 use crate::args::Force;
+use crate::features::{LEARN, only};
 use crate::output::{self, with_remedy};
 use crate::progress::{Bars, duration};
 use crate::report::{Outcome, Report};
@@ -47,13 +48,13 @@ const MAX_PIXELS: usize = 1 << 28;
         is multiplied by a power of two that its attribute veni:radianceScale records (this program divides by it \
         again); the attribute veni:scene holds all parameters of the scene as JSON. Image k of seed S is the same to the \
         bit whatever the count, the machine's number of cores, or what else is generated.",
-    after_help = "Examples:\n  \
+    after_help = format!("Examples:\n  \
         veni-cli synth --sheet sheet.png --count 64              only look\n  \
         veni-cli synth -o skies --count 10000                    a training set, 128 x 64 each\n  \
         veni-cli synth -o skies --count 10000 --resume           go on after an interruption\n  \
         veni-cli synth -o dusk --count 20 --scene sunset --place street --size 1024\n  \
-        veni-cli synth -o noon --scene clear --sun-elevation 60 --sun-azimuth 0 --turbidity 2.5 --cloud-cover 0\n  \
-        veni-cli train --data hdri --synthetic 10000 --out run   generated while training starts, without files"
+        veni-cli synth -o noon --scene clear --sun-elevation 60 --sun-azimuth 0 --turbidity 2.5 --cloud-cover 0{}",
+        only(LEARN, "\n  veni-cli train --data hdri --synthetic 10000 --out run   generated while training starts, without files"))
 )]
 pub(crate) struct Synth {
     /// Folder for the panoramas, created if missing

@@ -17,26 +17,34 @@ use anyhow::{Result, bail};
 use clap::Args;
 use veni_core::Error;
 
+use crate::features::{GPU, only};
 use crate::report::{self, Outcome, Report};
 use facts::Facts;
 
-/// Show what is inside models, latents, images and training runs, or the graphics devices
+/// What is said of graphics devices.
+const DEVICES: &str = "\n\nWith --devices: every graphics device that could bake, the first of them being the one that \
+    '--device gpu' takes. Backend and driver, what it allows, which optional features (f16, subgroups) the decoder uses \
+    there, its measured rate of multiply-adds, and whether its numbers agree with the CPU's. The exit code is 1 if there \
+    is none, or if one cannot be used or computes wrong numbers.";
+
+#[cfg_attr(
+    feature = "gpu",
+    doc = "Show what is inside models, latents, images and training runs, or the graphics devices"
+)]
+#[cfg_attr(not(feature = "gpu"), doc = "Show what is inside models, latents, images and training runs")]
 #[derive(Args, Debug)]
 #[command(
-    long_about = "Show what is inside models, latents, images and training runs.\n\n\
+    long_about = format!("Show what is inside models, latents, images and training runs.\n\n\
         Model: sizes, identity, training data, prior. Latent: vectors, lengths, exposure, the model it belongs to. \
         Image: size, storage, attributes, radiance over the sphere, dynamic range, where the sun is, the latent it \
         was baked from. Run folder: how far it is, how good.\n\n\
-        The content decides what a file is, not its name. Radiance statistics are weighted by solid angle.\n\n\
-        With --devices: every graphics device that could bake, the first of them being the one that '--device gpu' \
-        takes. Backend and driver, what it allows, which optional features (f16, subgroups) the decoder uses there, \
-        its measured rate of multiply-adds, and whether its numbers agree with the CPU's. The exit code is 1 if there \
-        is none, or if one cannot be used or computes wrong numbers.",
-    after_help = "Examples:\n  \
+        The content decides what a file is, not its name. Radiance statistics are weighted by solid angle.{}",
+        only(GPU, DEVICES)),
+    after_help = format!("Examples:\n  \
         veni-cli inspect sky.exr\n  \
         veni-cli inspect --json *.exr | jq .radiance.max\n  \
-        veni-cli inspect runs/small\n  \
-        veni-cli inspect --devices"
+        veni-cli inspect runs/small{}",
+        only(GPU, "\n  veni-cli inspect --devices"))
 )]
 pub(crate) struct Inspect {
     /// Files, or folders of training runs
@@ -44,7 +52,7 @@ pub(crate) struct Inspect {
     files: Vec<PathBuf>,
 
     /// List the graphics devices instead, and measure and check each
-    #[arg(long, conflicts_with = "files")]
+    #[arg(long, conflicts_with = "files", hide = !GPU)]
     devices: bool,
 }
 
