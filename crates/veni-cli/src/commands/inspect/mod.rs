@@ -48,18 +48,22 @@ const DEVICES: &str = "\n\nWith --devices: every graphics device that could bake
 )]
 pub(crate) struct Inspect {
     /// Files, or folders of training runs
-    #[arg(required_unless_present = "devices", value_name = "FILE")]
+    #[cfg_attr(feature = "gpu", arg(required_unless_present = "devices"))]
+    #[cfg_attr(not(feature = "gpu"), arg(required = true))]
+    #[arg(value_name = "FILE")]
     files: Vec<PathBuf>,
 
     /// List the graphics devices instead, and measure and check each
-    #[arg(long, conflicts_with = "files", hide = !GPU)]
+    #[cfg(feature = "gpu")]
+    #[arg(long, conflicts_with = "files")]
     devices: bool,
 }
 
 impl Inspect {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        #[cfg(feature = "gpu")]
         if self.devices {
-            return devices(report);
+            return devices::run(report);
         }
         report::each(&self.files, |path| {
             let name = path.display().to_string();
@@ -67,16 +71,6 @@ impl Inspect {
             report.result(facts.text(&name), &facts.json("file", &name))
         })
     }
-}
-
-#[cfg(feature = "gpu")]
-fn devices(report: Report) -> Result<Outcome> {
-    devices::run(report)
-}
-
-#[cfg(not(feature = "gpu"))]
-fn devices(_: Report) -> Result<Outcome> {
-    bail!("inspect --devices: {}", crate::device::NO_GPU)
 }
 
 fn describe(path: &Path) -> Result<Facts> {
