@@ -1,7 +1,6 @@
 //! Every command and option that a text names is one that can be typed.
 
 use std::collections::{BTreeMap, BTreeSet};
-#[cfg(all(feature = "learn", feature = "gpu"))]
 use std::path::{Path, PathBuf};
 
 use clap::CommandFactory;
@@ -38,6 +37,9 @@ const FOREIGN: [&str; 24] = [
 ];
 /// What follows the program's name in a sentence.
 const PROSE: [&str; 0] = [];
+
+/// What the command line stands on.
+const LIBRARIES: [&str; 2] = ["veni-core", "veni-gpu"];
 
 /// The options of each command.
 struct Known(BTreeMap<String, BTreeSet<String>>);
@@ -117,7 +119,6 @@ fn options(word: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-#[cfg(all(feature = "learn", feature = "gpu"))]
 fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
@@ -136,21 +137,33 @@ fn help_names_what_this_build_has() {
     assert_eq!(promises("through the encoder\n") || promises("encodes panoramas"), LEARN);
 }
 
+/// The texts of a crate, each with its file; tests may name what they like.
+fn texts(name: &str) -> Vec<(String, String)> {
+    let mut texts = Vec::new();
+    for (file, source) in structure::read(&workspace().join("crates").join(name).join("src")).unwrap() {
+        let file = file.display().to_string();
+        if !file.contains("test") && !file.ends_with("advice.rs") {
+            texts.extend(structure::strings(&source).into_iter().map(|text| (file.clone(), text)));
+        }
+    }
+    assert!(texts.len() > 30, "only {} texts were found in {name}", texts.len());
+    texts
+}
+
+#[test]
+fn libraries_leave_options_and_commands_to_the_command_line() {
+    for (file, text) in LIBRARIES.iter().flat_map(|name| texts(name)) {
+        let named = text.split_whitespace().any(|word| options(word).next().is_some());
+        assert!(!named && !text.contains("veni-cli"), "{file}: {text}");
+    }
+}
+
 /// Messages and documents speak of the whole program.
 #[cfg(all(feature = "learn", feature = "gpu"))]
 #[test]
 fn messages_and_documents_name_what_there_is() {
     let known = Known::new();
-    let mut texts = Vec::new();
-    for name in ["veni-cli", "veni-core", "veni-gpu"] {
-        for (file, source) in structure::read(&workspace().join("crates").join(name).join("src")).unwrap() {
-            let file = file.to_string_lossy().into_owned();
-            if !file.contains("test") && !file.ends_with("advice.rs") {
-                texts.extend(structure::strings(&source).into_iter().map(|text| (file.clone(), text)));
-            }
-        }
-    }
-    assert!(texts.len() > 1000, "only {} texts were found", texts.len());
+    let mut texts = texts("veni-cli");
     let documents = std::fs::read_dir(workspace().join("docs")).unwrap().map(|entry| entry.unwrap().path());
     for path in
         documents.chain([workspace().join("README.md")]).filter(|p| p.extension().is_some_and(|e| e == "md"))
