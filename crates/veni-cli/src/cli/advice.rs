@@ -36,7 +36,7 @@ const FOREIGN: [&str; 24] = [
     "package",
 ];
 /// What follows the program's name in a sentence.
-const PROSE: [&str; 0] = [];
+const PROSE: [&str; 1] = ["was"];
 
 /// What the command line stands on.
 const LIBRARIES: [&str; 2] = ["veni-core", "veni-gpu"];
