@@ -9,7 +9,7 @@ use super::Cli;
 use crate::features::{GPU, LEARN};
 
 /// Options of cargo and other programs, which documents and messages name too.
-const FOREIGN: [&str; 24] = [
+const FOREIGN: [&str; 21] = [
     "array",
     "bench",
     "cases",
@@ -27,13 +27,10 @@ const FOREIGN: [&str; 24] = [
     "samples",
     "scope",
     "signal",
-    "target-dir",
     "test",
     "threads",
     "time",
     "veni",
-    "workspace",
-    "package",
 ];
 /// What follows the program's name in a sentence.
 const PROSE: [&str; 1] = ["was"];
@@ -66,7 +63,7 @@ impl Known {
     /// What a text names and nobody can type.
     fn unknown(&self, text: &str) -> Vec<String> {
         let text = text.replace("\\\n", " ");
-        let ends = ["\n", "&&", "|", ";", "'", "`", "\"", "(", ")"];
+        let ends = ["\n", "#", "&&", "|", ";", "'", "`", "\"", "(", ")"];
         let mut parts = vec![text.as_str()];
         for end in ends {
             parts = parts.into_iter().flat_map(|part| part.split(end)).collect();
