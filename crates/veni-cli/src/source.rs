@@ -8,7 +8,7 @@ mod model;
 
 #[cfg(feature = "learn")]
 pub(crate) use encoding::{Encoded, Encoding};
-pub(crate) use image::{expandable, panorama};
+pub(crate) use image::panorama;
 pub(crate) use latent::{from_file, is_latent, model_of, seeded};
 #[cfg(feature = "learn")]
 pub(crate) use model::model_file;

@@ -13,6 +13,14 @@ pub enum Error {
     /// The data is well formed, but not something this crate reads or does.
     #[error("{0}")]
     Unsupported(String),
+    /// An image whose format holds a display's range, where radiance is needed.
+    #[error("{}: {format} holds no high dynamic range; expand such panoramas into EXR files first", path.display())]
+    LowRange {
+        /// The image.
+        path: PathBuf,
+        /// Its format ("PNG").
+        format: &'static str,
+    },
     /// A file that was to be written is there already, and [`Overwrite`](crate::output::Overwrite) refuses.
     #[error("{}: exists already", path.display())]
     Exists {
@@ -78,7 +86,9 @@ impl Error {
             Self::Invalid(message) => Self::Invalid(named(message)),
             Self::Unsupported(message) => Self::Unsupported(named(message)),
             Self::TooLarge(message) => Self::TooLarge(named(message)),
-            other @ (Self::Exists { .. } | Self::Cancelled | Self::Io { .. }) => other,
+            other @ (Self::LowRange { .. } | Self::Exists { .. } | Self::Cancelled | Self::Io { .. }) => {
+                other
+            }
         }
     }
 

@@ -188,7 +188,7 @@ impl Evaluate {
         let bars = Bars::new(report);
         let data = Dataset::load_heard(&files, grid, &|done, all| bars.loading(done, all));
         bars.end();
-        let data = data?;
+        let data = data.map_err(with_remedy)?;
         inputs::create_folder(&self.out)?;
         let (store, figures) = (Store::new(&self.out), self.out.join("figures"));
         let settings =

@@ -72,7 +72,7 @@ impl Train {
         let trainer =
             Trainer::prepare(&self.out, config, &self.command_line(), &|done, all| bars.loading(done, all));
         bars.end();
-        let trainer = trainer.map_err(|e| self.where_to_look(e))?;
+        let trainer = trainer.map_err(|e| self.with_options(e))?;
         if replace {
             // what is there goes only now, when the new data is known to be good
             self.clear()?;
@@ -81,12 +81,17 @@ impl Train {
         Ok(trainer)
     }
 
-    /// Adds to an error about a graphics card that is not there where those that are stand.
-    fn where_to_look(&self, error: Error) -> anyhow::Error {
+    /// Adds to an error what the options of this command can do about it.
+    fn with_options(&self, error: Error) -> anyhow::Error {
         match error {
             Error::Unsupported(_) if self.device == Some(TrainDevice::Wgpu) && self.devices.is_some() => {
                 anyhow!("{error}; 'veni-cli inspect --devices' lists the adapters")
             }
+            // what the model differs in: the settings by the options that change them
+            Error::Invalid(text) if self.init.is_some() => anyhow!(
+                text.replace(": set model.latent_vectors=", ": --latent-vectors ")
+                    .replace(": set model.", ": --set model.")
+            ),
             error => with_remedy(error),
         }
     }
@@ -107,7 +112,7 @@ impl Train {
             bars.loading(done, all);
         });
         bars.end();
-        Ok(trainer?)
+        trainer.map_err(with_remedy)
     }
 
     fn report(

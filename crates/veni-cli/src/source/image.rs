@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use anyhow::{Result, anyhow};
-use veni_core::Error;
-use veni_core::panorama::{LdrPanorama, Panorama};
+use anyhow::Result;
+use veni_core::panorama::Panorama;
 
+use crate::output::with_remedy;
 use crate::report::Report;
 
 /// A panorama with every value positive and finite; says what was replaced.
 pub(crate) fn panorama(path: &Path, report: Report) -> Result<Panorama> {
-    let mut panorama = Panorama::read(path).map_err(|e| expandable(path, e))?;
+    let mut panorama = Panorama::read(path).map_err(with_remedy)?;
     let bad = panorama.sanitise().map_err(|e| e.in_file(path))?;
     if bad.nan + bad.infinite > 0 {
         report.note(format_args!(
@@ -21,14 +21,4 @@ pub(crate) fn panorama(path: &Path, report: Report) -> Result<Panorama> {
         ));
     }
     Ok(panorama)
-}
-
-/// Says of an image with a display's range, which the library refuses, what makes a panorama of it.
-pub(crate) fn expandable(path: &Path, error: Error) -> anyhow::Error {
-    match error {
-        Error::Unsupported(_) if LdrPanorama::recognise(path).unwrap_or(false) => {
-            anyhow!("{error}, as 'veni-cli prepare' does")
-        }
-        error => error.into(),
-    }
 }

@@ -10,10 +10,9 @@ use veni_core::latent::Latent;
 use veni_core::model::Model;
 use veni_core::panorama;
 
-use super::image::expandable;
 use super::model::{Loaded, embedded, model};
 use crate::args::ModelArgs;
-use crate::output::{CUBE_FACES, LATENT};
+use crate::output::{CUBE_FACES, LATENT, with_remedy};
 use crate::report::Report;
 
 /// The model of `--model`; where none is named, the one inside the program that the first latent in `files` belongs to.
@@ -56,7 +55,7 @@ fn stored(path: &Path) -> Result<Option<Latent>> {
     if is_latent(path)? {
         return Ok(Some(Latent::load(path)?));
     }
-    let attributes = panorama::attributes(path).map_err(|e| expandable(path, e))?;
+    let attributes = panorama::attributes(path).map_err(with_remedy)?;
     match attributes.get(LATENT) {
         Some(text) => Latent::from_json(text)
             .map(Some)

@@ -10,11 +10,10 @@ use veni_core::panorama::{self, Panorama};
 use super::facts::Facts;
 use super::latent;
 use super::statistics::Statistics;
-use crate::output::{CUBE_FACES, FRAME, LATENT};
-use crate::source::expandable;
+use crate::output::{CUBE_FACES, FRAME, LATENT, with_remedy};
 
 pub(super) fn describe(path: &Path) -> Result<Facts> {
-    let attributes = panorama::attributes(path).map_err(|e| expandable(path, e))?;
+    let attributes = panorama::attributes(path).map_err(with_remedy)?;
     let exr = exr_facts(path)?;
     let mut facts = Facts::new(if exr.is_some() { "OpenEXR image" } else { "Radiance HDR image" });
     let cube = exr.as_ref().is_some_and(|e| e.cube) || attributes.contains_key(CUBE_FACES);

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use veni_core::Error;
+use veni_core::model::ModelKind;
 use veni_core::train::config::{DecoderBy, TrainConfig};
 use veni_core::train::init::InitConfig;
 use veni_core::train::presets::Preset;
@@ -56,9 +57,11 @@ impl Train {
             config.init = Some(InitConfig { model: source::model_file(init)?, digest: None });
         }
         if self.pretrains() {
+            // its latents belong to its panoramas, so that two runs take the place of two stages
+            let is_decoder = config.model.kind == ModelKind::Reni;
+            let option = if is_decoder { "--pretrain (begin with --init instead)" } else { "--pretrain" };
             let (steps, scenes) = (self.pretrain_steps.unwrap_or(config.steps), self.pretrain_synthetic);
-            config =
-                config.pretrained_on(&self.pretrain, scenes.unwrap_or(0), steps).context("--pretrain")?;
+            config = config.pretrained_on(&self.pretrain, scenes.unwrap_or(0), steps).context(option)?;
         } else if self.pretrain_steps.is_some() {
             bail!(
                 "--pretrain-steps: there is nothing to pre-train on; give --pretrain or --pretrain-synthetic"

@@ -86,7 +86,7 @@ impl Panorama {
     /// [`HalfRange::Fit`]: super::HalfRange::Fit
     ///
     /// # Errors
-    /// [`Error::Unsupported`] for formats with a limited range (PNG, JPEG, …), cube maps, deep, subsampled or
+    /// [`Error::LowRange`] for formats with a limited range (PNG, JPEG, …); [`Error::Unsupported`] for cube maps, deep, subsampled or
     /// XYZ-coded images; [`Error::Invalid`] for damaged files and for sizes that `options` refuse;
     /// [`Error::Io`] if the file cannot be read.
     pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
@@ -187,10 +187,8 @@ fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
     if start.starts_with(b"#?") {
         return Ok(Kind::Hdr { strict: start.starts_with(b"#?RADIANCE") });
     }
-    if let Some((.., name)) = LDR.iter().find(|(at, magic, ..)| stands(&start, *at, magic)) {
-        return Err(Error::unsupported(format!(
-            "{name} holds no high dynamic range; expand such panoramas into EXR files first"
-        )));
+    if let Some((.., format)) = LDR.iter().find(|(at, magic, ..)| stands(&start, *at, magic)) {
+        return Err(Error::LowRange { path: path.to_path_buf(), format });
     }
     Err(unknown(&start, "neither an OpenEXR nor a Radiance .hdr file"))
 }
