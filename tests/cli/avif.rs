@@ -28,8 +28,8 @@ fn a_program_without_a_decoder_says_how_to_build_one() {
 #[cfg(feature = "avif")]
 #[test]
 fn avif_photographs_become_panoramas() {
-    use veni_core::panorama::Panorama;
-    use veni_core::panorama::tonemap::srgb_to_linear;
+    use veni_image::Panorama;
+    use veni_image::tonemap::srgb_to_linear;
     let dir = folder();
     dir.ok(&PREPARE);
     let found = Panorama::read(dir.path("data/train/street.exr")).unwrap();

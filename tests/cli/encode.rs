@@ -93,9 +93,9 @@ fn a_model_without_encoder_says_so() {
     // nothing in the command line strips an encoder yet: the shape of a model that only decodes is made here
     let dir = Dir::new();
     let decode_only = dir.path("decode-only.safetensors");
-    let full = veni_core::model::Model::load(model()).unwrap();
+    let full = veni_light::model::Model::load(model()).unwrap();
     full.without_encoder()
-        .save(&decode_only, veni_core::model::StoredType::F32, veni_core::output::Overwrite::Refuse)
+        .save(&decode_only, veni_light::model::StoredType::F32, veni_light::output::Overwrite::Refuse)
         .unwrap();
     let name = text(&decode_only);
     dir.refused(&["encode", &panorama(), "--model", &name, "-o", "a.json"], &["decode-only", "no encoder"]);

@@ -152,9 +152,9 @@ fn every_protocol_runs_and_paper_runs_them_all() {
 #[test]
 fn models_are_compared_under_their_names() {
     let (dir, data) = (Dir::new(), text(panoramas()));
-    let full = veni_core::model::Model::load(model()).unwrap();
+    let full = veni_light::model::Model::load(model()).unwrap();
     full.without_encoder()
-        .save(dir.path("bare.safetensors"), veni_core::model::StoredType::F32, Default::default())
+        .save(dir.path("bare.safetensors"), veni_light::model::StoredType::F32, Default::default())
         .unwrap();
     let whole = format!("whole={}", model());
     let mut args = args("reconstruction", &data, &[]);

@@ -16,8 +16,8 @@ fn a_program_without_the_runtime_says_how_to_build_one() {
 mod with_runtime {
     use image::{Rgb, RgbImage};
     use serde_json::Value;
-    use veni_core::panorama::Panorama;
-    use veni_core::panorama::tonemap::srgb_to_linear;
+    use veni_image::Panorama;
+    use veni_image::tonemap::srgb_to_linear;
 
     use super::Dir;
     use crate::onnx_file::OnnxFile;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::Value;
-use veni_core::panorama::tonemap::srgb;
-use veni_core::panorama::{Panorama, Precision, WriteFormat, WriteOptions};
+use veni_image::tonemap::srgb;
+use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
 
 use crate::util::{Dir, panoramas, text, train_args};
 
@@ -22,7 +22,7 @@ fn exr(panorama: &Panorama, path: &Path) {
 /// As a display would show it, with the brightest tenth clipped.
 fn picture(name: &str) -> RgbImage {
     let panorama = Panorama::read(original(name)).unwrap();
-    let white = veni_core::panorama::tonemap::quantile(panorama.pixels().as_flattened(), 0.9);
+    let white = veni_image::tonemap::quantile(panorama.pixels().as_flattened(), 0.9);
     let grid = panorama.grid();
     RgbImage::from_fn(grid.width as u32, grid.height as u32, |x, y| {
         let pixel = panorama.pixel(x as usize, y as usize);

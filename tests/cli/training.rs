@@ -244,7 +244,7 @@ fn a_run_begins_with_the_weights_of_a_model() {
     let data = text(panoramas());
     // no update at all: the run's model is the one it began with
     let none = [&train_args(&data, "none", "0")[..], &["--init", model()]].concat();
-    let full = veni_core::model::Model::load(model()).unwrap();
+    let full = veni_light::model::Model::load(model()).unwrap();
     dir.ok(&none);
     assert_eq!(weights_of(&dir, "none", "encoder."), tensors(&full, "encoder."));
     assert_eq!(weights_of(&dir, "none", "decoder."), tensors(&full, "decoder."));
@@ -256,7 +256,7 @@ fn a_run_begins_with_the_weights_of_a_model() {
     // a decoder alone, in both systems, and said so
     full.clone()
         .without_encoder()
-        .save(dir.path("bare.safetensors"), veni_core::model::StoredType::F32, Default::default())
+        .save(dir.path("bare.safetensors"), veni_light::model::StoredType::F32, Default::default())
         .unwrap();
     for (system, word) in [("veni", "no encoder"), ("reni++", "auto-decoder")] {
         let mut args = train_args(&data, system, "0");
@@ -283,13 +283,13 @@ fn a_run_begins_with_the_weights_of_a_model() {
     dir.refused(&repeat, &["bare.safetensors"]);
 }
 
-fn tensors(model: &veni_core::model::Model, prefix: &str) -> Vec<(String, Vec<f32>)> {
+fn tensors(model: &veni_light::model::Model, prefix: &str) -> Vec<(String, Vec<f32>)> {
     let inside = model.tensors().iter().filter(|(name, _)| name.starts_with(prefix));
     inside.map(|(name, tensor)| (name.clone(), tensor.data.clone())).collect()
 }
 
 fn weights_of(dir: &Dir, run: &str, prefix: &str) -> Vec<(String, Vec<f32>)> {
-    tensors(&veni_core::model::Model::load(dir.path(run).join("model.safetensors")).unwrap(), prefix)
+    tensors(&veni_light::model::Model::load(dir.path(run).join("model.safetensors")).unwrap(), prefix)
 }
 
 #[test]

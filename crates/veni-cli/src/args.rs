@@ -32,7 +32,7 @@ pub(crate) struct Force {
     pub(crate) force: bool,
 }
 
-impl From<Force> for veni_core::output::Overwrite {
+impl From<Force> for veni_light::output::Overwrite {
     fn from(f: Force) -> Self {
         if f.force { Self::Replace } else { Self::Refuse }
     }

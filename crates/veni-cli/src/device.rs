@@ -6,10 +6,10 @@ mod directions;
 pub(crate) mod gpu;
 
 use anyhow::Result;
-use veni_core::field::{Decoder, Field};
-use veni_core::latent::Latent;
-use veni_core::model::Model;
-use veni_core::sphere::Equirect;
+use veni_light::field::{Decoder, Field};
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_light::sphere::Equirect;
 
 use crate::args::DecodeDevice;
 use crate::output::Push;
@@ -83,7 +83,7 @@ impl Device {
 
 impl Baker {
     /// The rows of an image from the top, a few in memory at a time.
-    pub(crate) fn rows(&self, directions: Directions, each: Push<'_>) -> veni_core::Result<()> {
+    pub(crate) fn rows(&self, directions: Directions, each: Push<'_>) -> veni_light::Result<()> {
         match self {
             Self::Cpu(field) => cpu::rows(field, directions, each),
             #[cfg(feature = "gpu")]
@@ -92,7 +92,7 @@ impl Baker {
     }
 
     /// A whole panorama, row-major from the top.
-    pub(crate) fn bake(&self, grid: Equirect) -> veni_core::Result<Vec<[f32; 3]>> {
+    pub(crate) fn bake(&self, grid: Equirect) -> veni_light::Result<Vec<[f32; 3]>> {
         let mut pixels = Vec::with_capacity(grid.len());
         self.rows(Directions::Equirect(grid), &mut |row| {
             pixels.extend_from_slice(row);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use veni_core::output::Overwrite;
+use veni_light::output::Overwrite;
 
 use crate::output::{check, check_distinct, create_folder, named, refuse_existing};
 use crate::shard::Shard;

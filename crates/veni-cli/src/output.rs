@@ -6,10 +6,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, anyhow, bail};
-use veni_core::Error;
-use veni_core::output::{self, Overwrite, process_token};
-use veni_core::panorama::{WriteOptions, write_rows};
-use veni_core::sphere::Equirect;
+use veni_light::Error;
+use veni_light::output::{self, Overwrite, process_token};
+use veni_image::{WriteOptions, write_rows};
+use veni_light::sphere::Equirect;
 
 /// Attribute of a baked image: the latent's JSON.
 pub(crate) const LATENT: &str = "veni:latent";
@@ -20,7 +20,7 @@ pub(crate) const FRAME: &str = "veni:frame";
 /// Attribute of a cube map: its faces from top to bottom.
 pub(crate) const CUBE_FACES: &str = "veni:cubeFaces";
 
-/// Attribute of a shaded image and of its normals: the camera (`veni_core::shade::Camera`).
+/// Attribute of a shaded image and of its normals: the camera (`veni_fit::shade::Camera`).
 pub(crate) const CAMERA: &str = "veni:camera";
 /// Attribute of a shaded image: what the surface is made of.
 pub(crate) const MATERIAL: &str = "veni:material";
@@ -135,7 +135,7 @@ pub(crate) fn with_remedy(error: Error) -> anyhow::Error {
 }
 
 /// Takes rows of linear radiance from the top down.
-pub(crate) type Push<'a> = &'a mut dyn FnMut(&[[f32; 3]]) -> veni_core::Result<()>;
+pub(crate) type Push<'a> = &'a mut dyn FnMut(&[[f32; 3]]) -> veni_light::Result<()>;
 
 /// Writes one image to several files in one pass: what `produce` pushes goes to all of them.
 ///
@@ -143,8 +143,8 @@ pub(crate) type Push<'a> = &'a mut dyn FnMut(&[[f32; 3]]) -> veni_core::Result<(
 pub(crate) fn write_all(
     files: &[(PathBuf, WriteOptions)],
     grid: Equirect,
-    produce: &mut dyn FnMut(Push<'_>) -> veni_core::Result<()>,
-) -> veni_core::Result<()> {
+    produce: &mut dyn FnMut(Push<'_>) -> veni_light::Result<()>,
+) -> veni_light::Result<()> {
     // writers put their own path before an error that passes through them; the first one said is the true one
     let mut first = None;
     let result = nest(files, grid, &mut |_| Ok(()), produce, &mut first);
@@ -155,9 +155,9 @@ fn nest(
     files: &[(PathBuf, WriteOptions)],
     grid: Equirect,
     outer: Push<'_>,
-    produce: &mut dyn FnMut(Push<'_>) -> veni_core::Result<()>,
+    produce: &mut dyn FnMut(Push<'_>) -> veni_light::Result<()>,
     first: &mut Option<Error>,
-) -> veni_core::Result<()> {
+) -> veni_light::Result<()> {
     let Some(((path, options), rest)) = files.split_first() else {
         return keep(produce(outer), first);
     };
@@ -172,7 +172,7 @@ fn nest(
 }
 
 /// Moves an error to `first` unless there is one, and leaves a stand-in that only says "stop".
-fn keep(result: veni_core::Result<()>, first: &mut Option<Error>) -> veni_core::Result<()> {
+fn keep(result: veni_light::Result<()>, first: &mut Option<Error>) -> veni_light::Result<()> {
     result.map_err(|error| {
         first.get_or_insert(error);
         Error::invalid("stopped")
@@ -182,7 +182,7 @@ fn keep(result: veni_core::Result<()>, first: &mut Option<Error>) -> veni_core::
 #[cfg(test)]
 mod tests {
     use super::*;
-    use veni_core::panorama::{Panorama, Precision, WriteFormat};
+    use veni_image::{Panorama, Precision, WriteFormat};
 
     fn options() -> WriteOptions {
         WriteOptions::new(WriteFormat::Exr(Precision::Float))

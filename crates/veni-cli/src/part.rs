@@ -1,7 +1,7 @@
 //! `I/N`: one part of N, as `--shard` and `--fold` take it.
 
 #[cfg(feature = "learn")]
-use veni_core::data::Fold;
+use veni_data::Fold;
 
 /// Part `number` of `of`, from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

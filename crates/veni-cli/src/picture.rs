@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use clap::ValueEnum;
-use veni_core::latent::Latent;
-use veni_core::panorama::Panorama;
-use veni_core::panorama::tonemap::Tonemap;
-use veni_core::sphere::{Equirect, Frame};
+use veni_light::latent::Latent;
+use veni_image::Panorama;
+use veni_image::tonemap::Tonemap;
+use veni_light::sphere::{Equirect, Frame};
 
 use crate::device::{Baker, Directions};
 use crate::output::{CUBE_FACES, FRAME, LATENT, MODEL};

@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use veni_core::output::{Overwrite, write_atomic};
-use veni_core::{Error, Result};
+use veni_light::output::{Overwrite, write_atomic};
+use veni_light::{Error, Result};
 
 /// Pixels between pictures.
 const GAP: usize = 4;

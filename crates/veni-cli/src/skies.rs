@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use veni_core::latent::Latent;
-use veni_core::output::Overwrite;
+use veni_light::latent::Latent;
+use veni_light::output::Overwrite;
 
 use crate::numbers::{finite, stops};
 use crate::output;

@@ -6,10 +6,10 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use clap::{ArgGroup, Args, ValueEnum};
 use serde_json::json;
-use veni_core::latent::Latent;
-use veni_core::output::Overwrite;
-use veni_core::panorama::tonemap::{Curve, Tonemap};
-use veni_core::panorama::{Precision, WriteFormat, WriteOptions};
+use veni_light::latent::Latent;
+use veni_light::output::Overwrite;
+use veni_image::tonemap::{Curve, Tonemap};
+use veni_image::{Precision, WriteFormat, WriteOptions};
 
 use crate::args::{Decoding, Force};
 use crate::device::Device;
@@ -142,7 +142,7 @@ impl Bake {
         // the exposure of a preview is that of the sky before --exposure, which would otherwise be undone
         let tonemap = if png { preview_tonemap(&device.condition(&named)?)? } else { NEUTRAL };
         let attributes = picture.attributes(&latent, &loaded.model.hash())?;
-        let files = |precision| -> veni_core::Result<Vec<_>> {
+        let files = |precision| -> veni_light::Result<Vec<_>> {
             let file = |path: &PathBuf| {
                 let mut format = WriteFormat::of(path, tonemap)?;
                 if let WriteFormat::Exr(p) = &mut format {
@@ -173,7 +173,7 @@ impl Bake {
                         && let Some(v) = row.as_flattened().iter().find(|v| **v > HALF_MAX && v.is_finite())
                     {
                         too_bright = Some(*v);
-                        return Err(veni_core::Error::invalid("beyond the range of half precision"));
+                        return Err(veni_light::Error::invalid("beyond the range of half precision"));
                     }
                     bars.add(1);
                     push(row)
@@ -187,7 +187,7 @@ impl Bake {
                     ));
                     precision = Precision::Float;
                 }
-                (Err(error @ veni_core::Error::Invalid(_)), None) if self.half => {
+                (Err(error @ veni_light::Error::Invalid(_)), None) if self.half => {
                     bail!("{error} (leave --half out, or darken with --exposure -1 …)")
                 }
                 (Err(error), None) => return Err(with_remedy(error)),

@@ -10,7 +10,7 @@ mod table;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use veni_core::sphere::Equirect;
+use veni_light::sphere::Equirect;
 
 use crate::args::ModelArgs;
 use crate::features::{GPU, only};

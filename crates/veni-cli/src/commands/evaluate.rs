@@ -7,18 +7,18 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use veni_core::Error;
-use veni_core::data::{Dataset, Fold};
-use veni_core::eval::codec::Codec;
-use veni_core::eval::lpips::{self, Lpips};
-use veni_core::eval::protocol::{
+use veni_light::Error;
+use veni_data::{Dataset, Fold};
+use veni_eval::codec::Codec;
+use veni_eval::lpips::{self, Lpips};
+use veni_eval::protocol::{
     Evaluation, Published, Report as Findings, Settings, Share, ablations, consistency, dataset_size,
     equivariance, interpolation, inverse_rendering, paper, reconstruction, uniqueness,
 };
-use veni_core::eval::store::Store;
-use veni_core::eval::table::{Format, Table};
-use veni_core::output::{Overwrite, write_atomic};
-use veni_core::sphere::Equirect;
+use veni_eval::store::Store;
+use veni_eval::table::{Format, Table};
+use veni_light::output::{Overwrite, write_atomic};
+use veni_light::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
 
 use crate::output::with_remedy;
@@ -266,7 +266,7 @@ impl Evaluate {
 }
 
 impl Protocol {
-    fn run(self, evaluation: &Evaluation<'_>, published: &Published) -> veni_core::Result<Findings> {
+    fn run(self, evaluation: &Evaluation<'_>, published: &Published) -> veni_light::Result<Findings> {
         match self {
             Self::Reconstruction => reconstruction::run(evaluation),
             Self::Uniqueness => uniqueness::run(evaluation),
@@ -281,7 +281,7 @@ impl Protocol {
     }
 
     /// A share of what takes long.
-    fn keep(self, evaluation: &Evaluation<'_>, share: Share) -> veni_core::Result<()> {
+    fn keep(self, evaluation: &Evaluation<'_>, share: Share) -> veni_light::Result<()> {
         match self {
             Self::Reconstruction => reconstruction::keep(evaluation, share),
             Self::Uniqueness => uniqueness::keep(evaluation, share),

@@ -11,12 +11,12 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
-use veni_core::eval::metrics::{Alignment, Scores, scores};
-use veni_core::eval::subject::Subject;
+use veni_image::metrics::{Alignment, Scores, scores};
+use veni_core::LoadedModel;
 use veni_core::fit::{Best, FitConfig, FitTarget, Observation, best_light, best_of, random_starts};
-use veni_core::latent::Latent;
-use veni_core::output::Overwrite;
-use veni_core::sphere::Equirect;
+use veni_light::latent::Latent;
+use veni_light::output::Overwrite;
+use veni_light::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
 
 use crate::args::{Force, ModelArgs};
@@ -113,7 +113,7 @@ impl Fit {
         let loaded = source::model(&self.model)?;
         let device = DeviceKind::Flex.device()?;
         let subject =
-            Subject::new(&loaded.name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?;
+            LoadedModel::new(&loaded.name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?;
         report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
             self.one(path, outputs.get(at), &subject, &config, report)
         })
@@ -148,7 +148,7 @@ impl Fit {
         &self,
         path: &Path,
         output: Option<&PathBuf>,
-        subject: &Subject,
+        subject: &LoadedModel,
         config: &FitConfig,
         report: Report,
     ) -> Result<()> {
@@ -188,7 +188,7 @@ impl Fit {
         &self,
         path: &Path,
         observation: Observation,
-        subject: &Subject,
+        subject: &LoadedModel,
         config: &FitConfig,
         report: Report,
     ) -> Result<Fitted> {
@@ -227,7 +227,7 @@ impl Fit {
         path: &Path,
         normals: &Path,
         picture: &input::Read,
-        subject: &Subject,
+        subject: &LoadedModel,
         config: &FitConfig,
         report: Report,
     ) -> Result<Fitted> {
@@ -274,7 +274,7 @@ impl Fit {
     }
 
     /// The latents to start from, at the exposure that the observation was brought to.
-    fn starts(&self, path: &Path, observation: &Observation, subject: &Subject) -> Result<Vec<Latent>> {
+    fn starts(&self, path: &Path, observation: &Observation, subject: &LoadedModel) -> Result<Vec<Latent>> {
         let whole = !observation.is_partial();
         let has_encoder = subject.model().has_encoder();
         let (start, count) = self.settings.start(whole, has_encoder);
@@ -340,7 +340,7 @@ impl Fit {
 }
 
 /// The article's protocol, on the pixels that were fitted.
-fn score(subject: &Subject, latent: &Latent, seen: &Observation) -> Result<Scores> {
+fn score(subject: &LoadedModel, latent: &Latent, seen: &Observation) -> Result<Scores> {
     let Equirect { width, height } = seen.grid;
     let decoded = subject.decode(seen.grid, std::slice::from_ref(latent))?.concat();
     Ok(scores(&decoded, &seen.log_radiance, height, width, Alignment::LogFactor))

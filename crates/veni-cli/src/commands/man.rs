@@ -7,8 +7,8 @@ use anyhow::Result;
 use clap::{Args, Command};
 use clap_mangen::Man as Page;
 use serde_json::json;
-use veni_core::Error;
-use veni_core::output::{Overwrite, write_atomic};
+use veni_light::Error;
+use veni_light::output::{Overwrite, write_atomic};
 
 use crate::args::Force;
 use crate::output::{refuse_existing, with_remedy};

@@ -14,9 +14,9 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use veni_core::panorama::ReadOptions;
-use veni_core::prepare::{PrepareConfig, Shares};
-use veni_core::sphere::Equirect;
+use veni_image::ReadOptions;
+use veni_data::prepare::{PrepareConfig, Shares};
+use veni_light::sphere::Equirect;
 
 use crate::args::Force;
 use crate::features::{LEARN, only};

@@ -6,11 +6,11 @@ use std::str::FromStr;
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
-use veni_core::Error;
-use veni_core::output::Overwrite;
-use veni_core::panorama::Panorama;
-use veni_core::panorama::tonemap::Tonemap;
-use veni_core::sphere::Equirect;
+use veni_light::Error;
+use veni_light::output::Overwrite;
+use veni_image::Panorama;
+use veni_image::tonemap::Tonemap;
+use veni_light::sphere::Equirect;
 
 use crate::args::{Decoding, Force};
 use crate::device::Device;

@@ -10,11 +10,11 @@ use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde_json::json;
-use veni_core::output::Overwrite;
-use veni_core::panorama::tonemap::Tonemap;
-use veni_core::panorama::{Panorama, Precision};
-use veni_core::sphere::Equirect;
-use veni_core::synth::{Fixed, Place, Scene, SkyKind, generate};
+use veni_light::output::Overwrite;
+use veni_image::tonemap::Tonemap;
+use veni_image::{Panorama, Precision};
+use veni_light::sphere::Equirect;
+use veni_synth::{Fixed, Place, Scene, SkyKind, generate};
 
 use crate::args::Force;
 use crate::features::{LEARN, only};

@@ -13,8 +13,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
 use serde_json::json;
-use veni_core::Error;
-use veni_core::model::ModelKind;
+use veni_light::Error;
+use veni_light::model::ModelKind;
 use veni_core::train::config::TrainConfig;
 use veni_core::train::init::Initialised;
 use veni_core::train::run::{Finish, Trainer};

@@ -1,7 +1,7 @@
 //! Baking on all cores.
 
-use veni_core::field::Field;
-use veni_core::sphere::{CubeFace, Frame};
+use veni_light::field::Field;
+use veni_light::sphere::{CubeFace, Frame};
 
 use super::directions::Directions;
 use crate::output::Push;
@@ -10,14 +10,14 @@ use crate::output::Push;
 const CUBE_BAND: usize = 1 << 18;
 
 /// Hands over the rows of an image from the top.
-pub(super) fn rows(field: &Field, directions: Directions, each: Push<'_>) -> veni_core::Result<()> {
+pub(super) fn rows(field: &Field, directions: Directions, each: Push<'_>) -> veni_light::Result<()> {
     match directions {
         Directions::Equirect(grid) => field.bake_rows(grid, 0..grid.height, |_, row| each(row)),
         Directions::Cube { edge, frame } => cube_rows(field, edge, frame, each),
     }
 }
 
-fn cube_rows(field: &Field, edge: usize, frame: Frame, each: Push<'_>) -> veni_core::Result<()> {
+fn cube_rows(field: &Field, edge: usize, frame: Frame, each: Push<'_>) -> veni_light::Result<()> {
     let band = (CUBE_BAND / edge).clamp(1, edge);
     let mut pixels = vec![[0.0; 3]; band * edge];
     let mut directions = Vec::with_capacity(pixels.len());

@@ -1,6 +1,6 @@
 //! Which direction each pixel of an image has.
 
-use veni_core::sphere::{Equirect, Frame};
+use veni_light::sphere::{Equirect, Frame};
 
 /// Which direction each pixel of an image has.
 #[derive(Clone, Copy, Debug)]

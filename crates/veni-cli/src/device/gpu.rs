@@ -4,9 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
-use veni_core::latent::Latent;
-use veni_core::model::Model;
-use veni_core::sphere::Frame;
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_light::sphere::Frame;
 use veni_gpu::adapters::{self, Found, Opened};
 use veni_gpu::read_back::{self, Picture};
 use veni_gpu::shader::Grid;
@@ -112,7 +112,7 @@ impl Gpu {
 
 impl Conditioned {
     /// Hands over the rows of an image from the top. While one band is read, the next is computed.
-    pub(super) fn rows(&self, directions: Directions, each: Push<'_>) -> veni_core::Result<()> {
+    pub(super) fn rows(&self, directions: Directions, each: Push<'_>) -> veni_light::Result<()> {
         let Inner { name, opened, decoder } = &*self.gpu;
         let picture = picture(directions);
         let rows = read_back::bake_rows(decoder, &opened.queue, &self.latents, picture, |_, row| {
@@ -121,7 +121,7 @@ impl Conditioned {
         rows.map_err(|error| match error {
             // what `each` said is no fault of the device
             veni_gpu::Error::Core(error) => error,
-            error => veni_core::Error::unsupported(format!("{name}: {error}; try --device cpu")),
+            error => veni_light::Error::unsupported(format!("{name}: {error}; try --device cpu")),
         })
     }
 }

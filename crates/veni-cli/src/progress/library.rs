@@ -1,7 +1,7 @@
 //! What the library tells of its work.
 
-use veni_core::eval::protocol::Watch;
-use veni_core::eval::reconstruction::MeanScores;
+use veni_eval::protocol::Watch;
+use veni_image::metrics::MeanScores;
 use veni_core::train::progress::{Progress, StepReport, ValidationReport};
 
 use super::Bars;

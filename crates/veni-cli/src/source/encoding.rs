@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use veni_core::data::Item;
-use veni_core::eval::metrics::{Alignment, Scores, scores};
-use veni_core::field::Field;
-use veni_core::latent::Latent;
-use veni_core::panorama::Panorama;
-use veni_core::sphere::Equirect;
+use veni_data::Item;
+use veni_image::metrics::{Alignment, Scores, scores};
+use veni_light::field::Field;
+use veni_light::latent::Latent;
+use veni_image::Panorama;
+use veni_light::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
 use veni_core::vae::Veni;
 

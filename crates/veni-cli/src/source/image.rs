@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use veni_core::panorama::Panorama;
+use veni_image::Panorama;
 
 use crate::output::with_remedy;
 use crate::report::Report;

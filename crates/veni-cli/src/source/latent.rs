@@ -5,10 +5,10 @@ use std::io::Read;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail};
-use veni_core::Error;
-use veni_core::latent::Latent;
-use veni_core::model::Model;
-use veni_core::panorama;
+use veni_light::Error;
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_image;
 
 use super::model::{Loaded, embedded, model};
 use crate::args::ModelArgs;

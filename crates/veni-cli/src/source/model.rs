@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 #[cfg(feature = "pretrained")]
 use anyhow::anyhow;
 use anyhow::{Result, bail};
-use veni_core::model::Model;
+use veni_light::model::Model;
 
 use crate::args::ModelArgs;
 

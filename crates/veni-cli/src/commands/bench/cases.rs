@@ -1,8 +1,8 @@
 //! What is baked: the decoders to compare.
 
 use anyhow::{Result, anyhow};
-use veni_core::latent::Latent;
-use veni_core::model::{Model, ModelConfig};
+use veni_light::latent::Latent;
+use veni_light::model::{Model, ModelConfig};
 
 use crate::args::ModelArgs;
 use crate::report::Report;

@@ -5,8 +5,8 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use veni_core::field::{self, Field};
-use veni_core::sphere::Equirect;
+use veni_light::field::{self, Field};
+use veni_light::sphere::Equirect;
 
 use super::cases::Case;
 use super::subject::{Bakes, Subject};

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow};
-use veni_core::sphere::Equirect;
+use veni_light::sphere::Equirect;
 use veni_gpu::adapters::{Found, Opened};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::{
@@ -177,7 +177,7 @@ fn checked<T>(device: &Device, work: impl FnOnce() -> T) -> Result<T> {
 
 #[cfg(test)]
 mod tests {
-    use veni_core::model::{Model, ModelConfig};
+    use veni_light::model::{Model, ModelConfig};
 
     use super::*;
 

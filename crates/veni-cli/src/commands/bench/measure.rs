@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use veni_core::sphere::Equirect;
+use veni_light::sphere::Equirect;
 
 use super::subject::Bakes;
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use veni_core::sphere::Equirect;
+use veni_light::sphere::Equirect;
 
 use super::cases::Case;
 

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use serde_json::{Value, json};
-use veni_core::sphere::Equirect;
+use veni_light::sphere::Equirect;
 
 use super::cases::Case;
 use super::measure::Measured;

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
-use veni_core::Error;
-use veni_core::baseline::Kind;
-use veni_core::data::{Fold, panorama_files};
-use veni_core::eval::codec::Basis;
-use veni_core::eval::subject::Subject;
-use veni_core::output::{Overwrite, existing_above, write_atomic};
+use veni_light::Error;
+use veni_eval::baseline::Kind;
+use veni_data::{Fold, panorama_files};
+use veni_eval::codec::Basis;
+use veni_core::LoadedModel;
+use veni_light::output::{Overwrite, existing_above, write_atomic};
 use veni_core::train::config::DeviceKind;
 
 use crate::args::ModelArgs;
@@ -34,7 +34,7 @@ pub(crate) enum BaselineName {
 }
 
 /// The models to compare, under distinct names.
-pub(super) fn subjects(models: &[String], device: DeviceKind) -> Result<Vec<Subject>> {
+pub(super) fn subjects(models: &[String], device: DeviceKind) -> Result<Vec<LoadedModel>> {
     let given = if models.is_empty() {
         vec![("veni".to_owned(), None)]
     } else {
@@ -51,14 +51,14 @@ pub(super) fn subjects(models: &[String], device: DeviceKind) -> Result<Vec<Subj
     let device = device.device()?;
     let load = |(name, path): (String, Option<PathBuf>)| {
         let loaded = source::model(&ModelArgs { model: path })?;
-        Ok(Subject::new(name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?)
+        Ok(LoadedModel::new(name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?)
     };
     given.into_iter().map(load).collect()
 }
 
 /// The bases asked for, of each size that a model has.
-pub(super) fn bases(names: &[BaselineName], subjects: &[Subject]) -> Result<Vec<Basis>> {
-    let mut sizes: Vec<_> = subjects.iter().map(Subject::dimension).collect();
+pub(super) fn bases(names: &[BaselineName], subjects: &[LoadedModel]) -> Result<Vec<Basis>> {
+    let mut sizes: Vec<_> = subjects.iter().map(LoadedModel::dimension).collect();
     sizes.sort_unstable();
     sizes.dedup();
     let mut bases = Vec::new();

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use anyhow::Result;
-use veni_core::eval::subject::Subject;
+use veni_core::LoadedModel;
 use veni_core::fit::Best;
-use veni_core::latent::Latent;
-use veni_core::output::Overwrite;
-use veni_core::panorama::tonemap::Tonemap;
-use veni_core::panorama::{Panorama, Precision, WriteFormat, WriteOptions};
-use veni_core::sphere::{Equirect, View};
+use veni_light::latent::Latent;
+use veni_light::output::Overwrite;
+use veni_image::tonemap::Tonemap;
+use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
+use veni_light::sphere::{Equirect, View};
 
 use super::input::Read;
 use crate::output::with_remedy;
@@ -23,7 +23,7 @@ const HOT: f32 = std::f32::consts::LN_2;
 
 /// What the images are made from.
 pub(super) struct Images<'a> {
-    pub(super) subject: &'a Subject,
+    pub(super) subject: &'a LoadedModel,
     pub(super) picture: &'a Read,
     pub(super) view: Option<View>,
     /// Whether the picture shows the panorama, or a surface lit by it.

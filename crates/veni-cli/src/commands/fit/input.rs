@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use image::{DynamicImage, ImageFormat, ImageReader};
-use veni_core::Error;
+use veni_light::Error;
 use veni_core::fit::{Observation, Picture};
-use veni_core::panorama::tonemap::srgb_to_linear;
-use veni_core::panorama::{Panorama, ReadOptions};
-use veni_core::sphere::{Equirect, View};
+use veni_image::tonemap::srgb_to_linear;
+use veni_image::{Panorama, ReadOptions};
+use veni_light::sphere::{Equirect, View};
 
 use crate::report::Report;
 
@@ -81,7 +81,7 @@ impl Input {
         Ok(read)
     }
 
-    pub(super) fn observe(&self, read: &Read, grid: Equirect) -> veni_core::Result<Observation> {
+    pub(super) fn observe(&self, read: &Read, grid: Equirect) -> veni_light::Result<Observation> {
         let picture =
             Picture { size: read.size, pixels: &read.pixels, known: read.known.as_deref(), clip: read.clip };
         match self.view() {

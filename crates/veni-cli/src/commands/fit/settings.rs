@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use veni_core::fit::{FitConfig, Method, Objective, Plateau};
-use veni_core::sphere::Equirect;
+use veni_light::sphere::Equirect;
 use veni_core::train::loss::LossConfig;
 use veni_core::train::schedule::LearningRate;
 

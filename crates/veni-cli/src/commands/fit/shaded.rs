@@ -4,15 +4,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use veni_core::eval::subject::Subject;
+use veni_core::LoadedModel;
 use veni_core::fit::matching_exposure;
-use veni_core::latent::Latent;
-use veni_core::panorama;
-use veni_core::shade::{
+use veni_light::latent::Latent;
+use veni_image;
+use veni_fit::shade::{
     Camera, Colour, ExposureForm, Lights, Material, NormalMap, ShadedImage, ShadedLoss, ShadingForm, Surface,
     Transfer, read_albedo, read_mask,
 };
-use veni_core::sphere::{Equirect, View};
+use veni_light::sphere::{Equirect, View};
 
 use super::input::Read;
 use crate::numbers::{albedo, fraction, lights, shininess};
@@ -148,7 +148,7 @@ impl Shaded {
         &self,
         image: &ShadedImage,
         picture: &Read,
-        subject: &Subject,
+        subject: &LoadedModel,
         starts: &mut [Latent],
     ) -> Result<()> {
         if self.shading == Shading::Reference {

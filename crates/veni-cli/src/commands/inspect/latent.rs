@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use serde_json::json;
-use veni_core::latent::Latent;
+use veni_light::latent::Latent;
 
 use super::facts::Facts;
 

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use veni_core::Error;
+use veni_light::Error;
 
 use crate::features::{GPU, only};
 use crate::report::{self, Outcome, Report};

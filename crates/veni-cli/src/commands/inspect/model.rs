@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::Result;
 use serde_json::{Value, json};
-use veni_core::Error;
-use veni_core::model::{DecoderConfig, Model};
+use veni_light::Error;
+use veni_light::model::{DecoderConfig, Model};
 
 use super::facts::Facts;
 

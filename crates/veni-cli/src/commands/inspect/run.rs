@@ -6,7 +6,7 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use serde_json::Value;
-use veni_core::Error;
+use veni_light::Error;
 
 use super::facts::Facts;
 

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use veni_core::panorama::{Panorama, luminance};
+use veni_image::{Panorama, luminance};
 
 /// Solid angle that is looked at for the sun, steradians: a cap of 3.2° radius. The disc itself (0.27°) is smaller
 /// than a pixel of most panoramas, its glow is not.
@@ -116,7 +116,7 @@ fn quantile_bin(histogram: &[f64], weight: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use veni_core::sphere::Equirect;
+    use veni_light::sphere::Equirect;
 
     #[test]
     fn a_lamp_is_found_where_it_is() {

@@ -1,11 +1,11 @@
 //! `contact.png`: what is in the training set, at a glance.
 
 use anyhow::Result;
-use veni_core::output::Overwrite;
-use veni_core::panorama::Panorama;
-use veni_core::panorama::tonemap::Tonemap;
-use veni_core::prepare::Split;
-use veni_core::sphere::Equirect;
+use veni_light::output::Overwrite;
+use veni_image::Panorama;
+use veni_image::tonemap::Tonemap;
+use veni_data::prepare::Split;
+use veni_light::sphere::Equirect;
 
 use super::place::{Kept, Placed};
 use super::store::Store;

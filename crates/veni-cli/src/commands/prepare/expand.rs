@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use veni_core::panorama::Transfer;
-use veni_core::panorama::expand::ExpandOptions;
-use veni_core::panorama::expand::network::{
+use veni_image::Transfer;
+use veni_data::expand::ExpandOptions;
+use veni_data::expand::network::{
     Network, NetworkInput, NetworkOptions, NetworkOutput, NetworkScale,
 };
-use veni_core::prepare::Expander;
-use veni_core::sphere::Equirect;
+use veni_data::prepare::Expander;
+use veni_light::sphere::Equirect;
 
 use super::network::NetworkSettings;
 use super::record::Fate;
@@ -138,7 +138,7 @@ impl Expand {
 /// The network and the start of its file's hash.
 #[cfg(feature = "onnx")]
 fn load(model: &Path) -> Result<(Arc<dyn Network>, String)> {
-    let network = veni_core::panorama::expand::network::OnnxNetwork::load(model)?;
+    let network = veni_data::expand::network::OnnxNetwork::load(model)?;
     let digest = network.digest().to_owned();
     Ok((Arc::new(network), digest))
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use veni_core::prepare::{Bond, Member, Shares, Split, assign, group};
+use veni_data::prepare::{Bond, Member, Shares, Split, assign, group};
 
 use super::record::{Fate, Record};
 use super::store::Store;

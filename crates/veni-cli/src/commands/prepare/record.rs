@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use veni_core::panorama::Sanitised;
-use veni_core::panorama::expand::network::Estimate;
-use veni_core::prepare::{Examined, Fingerprint, Split, capture};
+use veni_image::Sanitised;
+use veni_data::expand::network::Estimate;
+use veni_data::prepare::{Examined, Fingerprint, Split, capture};
 
 use super::network::NetworkSettings;
 use super::scan::Source;
@@ -115,7 +115,7 @@ impl Facts {
             factor: estimate.factor,
             below: estimate.below,
         };
-        let expansion = |done: veni_core::prepare::Expansion| Expansion {
+        let expansion = |done: veni_data::prepare::Expansion| Expansion {
             clipped: done.clipped,
             sun_direction: done.sun.map(|s| s.direction),
             sun_energy: done.sun.map(|s| s.energy),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use serde_json::{Value, json};
-use veni_core::prepare::Split;
+use veni_data::prepare::Split;
 
 use super::place::{Kept, Placed, Placing};
 use super::record::Record;

@@ -4,9 +4,9 @@ use std::sync::Mutex;
 
 use anyhow::Result;
 use rayon::prelude::*;
-use veni_core::output::Overwrite;
-use veni_core::panorama::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions};
-use veni_core::prepare::{Examined, PrepareConfig, content_hash, examine};
+use veni_light::output::Overwrite;
+use veni_image::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions};
+use veni_data::prepare::{Examined, PrepareConfig, content_hash, examine};
 
 use super::network::NetworkSettings;
 use super::record::{Facts, Fate, Record};
@@ -67,7 +67,7 @@ fn fate(
     config: &PrepareConfig,
     network: Option<&NetworkSettings>,
 ) -> Result<Fate> {
-    let refused = |error: veni_core::Error| {
+    let refused = |error: veni_light::Error| {
         let text = error.with_source();
         let prefix = format!("{}: ", source.path.display());
         Fate::Refused(text.strip_prefix(&prefix).unwrap_or(&text).to_owned())

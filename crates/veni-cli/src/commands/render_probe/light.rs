@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use veni_core::latent::Latent;
-use veni_core::panorama;
-use veni_core::sphere::Equirect;
+use veni_light::latent::Latent;
+use veni_image;
+use veni_light::sphere::Equirect;
 
 use crate::args::ModelArgs;
 use crate::output::{CUBE_FACES, with_remedy};

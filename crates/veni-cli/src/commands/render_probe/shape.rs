@@ -4,9 +4,9 @@ use std::path::Path;
 
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
-use veni_core::Error;
-use veni_core::shade::{Camera, Mesh, REFERENCE_FIELD_OF_VIEW, Surface};
-use veni_core::sphere::Frame;
+use veni_light::Error;
+use veni_fit::shade::{Camera, Mesh, REFERENCE_FIELD_OF_VIEW, Surface};
+use veni_light::sphere::Frame;
 
 use crate::report::Report;
 

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use veni_core::Error;
-use veni_core::output::Overwrite;
-use veni_core::panorama::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions, attributes};
-use veni_core::sphere::Equirect;
-use veni_core::synth::Scene;
+use veni_light::Error;
+use veni_light::output::Overwrite;
+use veni_image::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions, attributes};
+use veni_light::sphere::Equirect;
+use veni_synth::Scene;
 
 use crate::output::{create_folder, refuse_existing, writable};
 
@@ -70,7 +70,7 @@ impl Files {
     }
 
     /// Writes one panorama, unless it was found already.
-    pub(super) fn write(&self, scene: &Scene, panorama: &Panorama) -> veni_core::Result<()> {
+    pub(super) fn write(&self, scene: &Scene, panorama: &Panorama) -> veni_light::Result<()> {
         let path = self.path(scene.index);
         if self.resume && path.exists() {
             return Ok(());
@@ -95,7 +95,7 @@ fn make(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-fn json(scene: &Scene) -> veni_core::Result<String> {
+fn json(scene: &Scene) -> veni_light::Result<String> {
     serde_json::to_string(scene).map_err(|e| Error::invalid(format!("scene {}: {e}", scene.index)))
 }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use veni_core::data::Fold;
+use veni_data::Fold;
 use veni_core::train::config::{DeviceKind, Devices};
 use veni_core::train::presets::Preset;
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use veni_core::model::Model;
+use veni_light::model::Model;
 
 use super::args::{SystemName, Train};
 use super::holding::held_by;

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use veni_core::Error;
-use veni_core::model::ModelKind;
+use veni_light::Error;
+use veni_light::model::ModelKind;
 use veni_core::train::config::{DecoderBy, TrainConfig};
 use veni_core::train::init::InitConfig;
 use veni_core::train::presets::Preset;

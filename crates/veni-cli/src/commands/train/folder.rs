@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use veni_core::Error;
-use veni_core::output::existing_above;
+use veni_light::Error;
+use veni_light::output::existing_above;
 use veni_core::train::run::{is_free, leftovers};
 
 use super::args::Train;

@@ -1,6 +1,6 @@
 //! Settings of where panoramas are held, which change no result.
 
-use veni_core::data::Holding;
+use veni_data::Holding;
 
 /// Which of the settings of holding a `--set` gives.
 pub(super) fn held_by(set: &str) -> Option<&'static str> {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use veni_core::data::Holding;
+use veni_data::Holding;
 
 use super::args::Train;
 use super::config::read;
