@@ -36,7 +36,8 @@ const FOREIGN: [&str; 21] = [
 const PROSE: [&str; 1] = ["was"];
 
 /// What the command line stands on.
-const LIBRARIES: [&str; 2] = ["veni-core", "veni-gpu"];
+const LIBRARIES: [&str; 8] =
+    ["veni-core", "veni-data", "veni-eval", "veni-fit", "veni-gpu", "veni-image", "veni-light", "veni-synth"];
 
 /// The options of each command.
 struct Known(BTreeMap<String, BTreeSet<String>>);
