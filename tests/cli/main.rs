@@ -25,7 +25,7 @@ mod inspect;
 #[cfg(feature = "learn")]
 mod large_sets;
 #[cfg(feature = "onnx")]
-#[path = "../../crates/veni-core/src/panorama/expand/network/onnx_file.rs"]
+#[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-core's tests use the rest of it")]
 mod onnx_file;
 #[cfg(feature = "learn")]
