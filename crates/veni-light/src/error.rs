@@ -1,19 +1,17 @@
 //! The one error type of this crate: three kinds a caller can act on.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// What went wrong. Messages name the file, the offending value and the remedy.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
     /// The data violates its format or a documented requirement (truncated file, NaN, wrong shape).
-    #[error("{0}")]
     Invalid(String),
     /// The data is well formed, but not something this crate reads or does.
-    #[error("{0}")]
     Unsupported(String),
     /// The operating system refused.
-    #[error("{}: cannot {action}: {cause}", path.display())]
     Io {
         /// The file or folder concerned.
         path: PathBuf,
@@ -23,6 +21,17 @@ pub enum Error {
         cause: std::io::Error,
     },
 }
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Invalid(message) | Self::Unsupported(message) => f.write_str(message),
+            Self::Io { path, action, cause } => write!(f, "{}: cannot {action}: {cause}", path.display()),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
 
 /// A result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
