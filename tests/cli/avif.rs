@@ -22,7 +22,7 @@ fn a_program_without_a_decoder_says_how_to_build_one() {
     let run = dir.run(&PREPARE);
     assert_ne!(run.code, Some(0), "{run:?}");
     let said = format!("{}{}", run.out, run.err);
-    assert!(said.contains("in/street.avif") && said.contains("--features avif"), "{said}");
+    assert!(said.contains("in/street.avif") && said.contains("the feature avif"), "{said}");
 }
 
 #[cfg(feature = "avif")]

@@ -26,10 +26,10 @@ fn a_device_that_is_missing_names_the_remedy() {
     let dir = Dir::new();
     let data = text(panoramas());
     if cfg!(not(feature = "cuda")) {
-        dir.refused(&args(&data, "run", "cuda"), &["device cuda", "not compiled in", "--features cuda"]);
+        dir.refused(&args(&data, "run", "cuda"), &["device cuda", "not compiled in", "the feature cuda"]);
     }
     if cfg!(not(feature = "wgpu")) {
-        dir.refused(&args(&data, "run", "wgpu"), &["device wgpu", "not compiled in", "--features wgpu"]);
+        dir.refused(&args(&data, "run", "wgpu"), &["device wgpu", "not compiled in", "the feature wgpu"]);
     }
 }
 

@@ -48,8 +48,8 @@ fn latents(data: &Data, batch: usize) -> Vec<Latent> {
 /// A fit along the authors' directions, rounded as in their program: with steps of 0.1, the last bits of the
 /// directions change a latent coordinate by 1e-3 within 20 steps.
 fn run_fit(decoder: &Decoder, target: &FitTarget<'_>, start: &[Latent], config: &FitConfig) -> FitResult {
-    let directions: Vec<_> = decoder_directions(target.grid).into_iter().map(camera_to_native).collect();
-    let target = FitTarget { directions: Some(&directions), ..target.clone() };
+    let directions: Vec<_> = decoder_directions(target.grid()).into_iter().map(camera_to_native).collect();
+    let target = target.clone().in_directions(directions, None).unwrap_or_else(|e| panic!("{e}"));
     fit(decoder, &target, start, config).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -73,7 +73,7 @@ fn helper(case: &Case, device: &Device) {
     let (image, mask, start) = (case.data("in.image"), case.data("in.mask"), case.data("in.latent0"));
     let grid = Equirect::new(image.shape[1], image.shape[0]);
     let (images, masks) = ([image.values.as_slice()], [mask.values.as_slice()]);
-    let target = FitTarget { masks: Some(&masks), ..FitTarget::panoramas(grid, &images) };
+    let target = FitTarget::panoramas(grid, &images).and_then(|t| t.masked(&masks)).unwrap_or_else(|e| panic!("{e}"));
     let last = number(case, "max_steps") as u64;
     let reference = FitConfig::reference_helper(number(case, "lr"), number(case, "lr_final"), last);
     let after = |steps| {
@@ -112,7 +112,7 @@ pub(crate) fn evaluate(case: &Case, device: &Device) -> FitResult {
     let [batch, height, width, 3] = images.shape[..] else { panic!("images of shape {:?}", images.shape) };
     let views: Vec<_> = images.values.chunks_exact(3 * width * height).collect();
     let grid = Equirect::new(width, height);
-    let target = FitTarget::panoramas(grid, &views);
+    let target = FitTarget::panoramas(grid, &views).unwrap_or_else(|e| panic!("{e}"));
     let mut start = latents(case.data("param.eval_mu"), batch);
     let scales = case.get("param.eval_scale");
     if let Some(scales) = scales {

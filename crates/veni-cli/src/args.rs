@@ -1,65 +1,8 @@
-//! The command line as a whole, and the arguments that several commands share.
+//! The arguments that several commands share.
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
-
-use crate::commands;
-
-/// Everything that can be typed.
-#[derive(Debug, Parser)]
-#[command(
-    name = "veni-cli",
-    version,
-    about = "Natural light for renderers, from a learned prior of outdoor skies",
-    long_about = "Natural light for renderers, from a learned prior of outdoor skies.\n\n\
-        VENI turns an HDR environment map into a few vectors (a latent) that rotate with it, and a latent \
-        back into radiance for any direction. This tool bakes skies to image files, on the graphics card if there \
-        is one, encodes panoramas, fits latents to panoramas, parts of them and photographs, trains models, shows what is inside files and measures how fast this machine is.",
-    after_help = "Results are printed on stdout, everything else on stderr.\n\
-        Exit codes: 0 fine; 1 ran, but stopped early or the answer is no; 2 error.\n\n\
-        Examples:\n  \
-        veni-cli bake --seed 7 -o sky.exr             a random sky\n  \
-        veni-cli sample -o sheet.png                  sixteen random skies on one sheet\n  \
-        veni-cli inspect sky.exr                      size, range, sun, the latent inside\n  \
-        veni-cli inspect --devices                    which graphics devices can bake\n\n\
-        'veni-cli help COMMAND' explains a command.",
-    propagate_version = true
-)]
-pub(crate) struct Cli {
-    #[command(subcommand)]
-    pub(crate) command: Command,
-
-    /// Print each result as one line of JSON
-    #[arg(long, global = true, display_order = 900)]
-    pub(crate) json: bool,
-
-    /// Print results and errors only: no progress, no notes
-    #[arg(long, short, global = true, display_order = 901)]
-    pub(crate) quiet: bool,
-}
-
-/// The commands, in the order of `--help`.
-#[derive(Debug, Subcommand)]
-pub(crate) enum Command {
-    Bake(commands::bake::Bake),
-    Sample(commands::sample::Sample),
-    Synth(commands::synth::Synth),
-    #[cfg(feature = "learn")]
-    Encode(commands::encode::Encode),
-    #[cfg(feature = "learn")]
-    Fit(commands::fit::Fit),
-    Prepare(commands::prepare::Prepare),
-    RenderProbe(commands::render_probe::RenderProbe),
-    #[cfg(feature = "learn")]
-    Evaluate(commands::evaluate::Evaluate),
-    Inspect(commands::inspect::Inspect),
-    Bench(commands::bench::Bench),
-    #[cfg(feature = "learn")]
-    Train(commands::train::Train),
-    Completions(commands::completions::Completions),
-    Man(commands::man::Man),
-}
+use clap::{Args, ValueEnum};
 
 /// Which model decodes (and encodes).
 #[derive(Args, Debug)]
@@ -68,6 +11,17 @@ pub(crate) struct ModelArgs {
     /// numbers [default: the one inside that a latent names, or 27]
     #[arg(long, short, value_name = "FILE|SIZE")]
     pub(crate) model: Option<PathBuf>,
+}
+
+/// Model and device of what is baked.
+#[derive(Args, Debug)]
+pub(crate) struct Decoding {
+    #[command(flatten)]
+    pub(crate) model: ModelArgs,
+
+    /// What decodes
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) device: DecodeDevice,
 }
 
 /// Whether existing files may be replaced.
@@ -87,36 +41,16 @@ impl From<Force> for veni_light::output::Overwrite {
 /// What decodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DecodeDevice {
-    /// The graphics card if there is one, else the CPU; never a card emulated in software
+    #[cfg_attr(
+        feature = "gpu",
+        doc = "The graphics card if there is one, else the CPU; never a card emulated in software"
+    )]
+    #[cfg_attr(not(feature = "gpu"), doc = "The CPU: this build cannot use graphics devices")]
     #[default]
     Auto,
     /// All CPU cores
     Cpu,
     /// The first device that 'veni-cli inspect --devices' lists, a software one too
+    #[cfg_attr(not(feature = "gpu"), value(hide = true))]
     Gpu,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use clap::CommandFactory;
-
-    #[test]
-    fn the_command_line_is_consistent() {
-        Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn every_command_and_argument_is_explained() {
-        let mut cli = Cli::command();
-        cli.build();
-        for command in cli.get_subcommands().filter(|c| c.get_name() != "help") {
-            let name = command.get_name();
-            assert!(command.get_about().is_some(), "{name} has no description");
-            assert!(command.get_after_help().is_some(), "{name} shows no examples");
-            for argument in command.get_arguments() {
-                assert!(argument.get_help().is_some(), "{name}: {} is not explained", argument.get_id());
-            }
-        }
-    }
 }

@@ -1,6 +1,7 @@
 //! What decodes: the CPU or a graphics device, chosen by `--device`, and baking on either.
 
 mod cpu;
+mod directions;
 #[cfg(feature = "gpu")]
 pub(crate) mod gpu;
 
@@ -8,11 +9,13 @@ use anyhow::Result;
 use veni_light::field::{Decoder, Field};
 use veni_light::latent::Latent;
 use veni_light::model::Model;
-use veni_light::sphere::{Equirect, Frame};
+use veni_light::sphere::Equirect;
 
 use crate::args::DecodeDevice;
 use crate::output::Push;
 use crate::report::Report;
+
+pub(crate) use directions::Directions;
 
 /// What the CPU is called in results.
 pub(crate) const CPU: &str = "CPU";
@@ -34,15 +37,6 @@ pub(crate) enum Baker {
     Cpu(Field),
     #[cfg(feature = "gpu")]
     Gpu(gpu::Conditioned),
-}
-
-/// Which direction each pixel of an image has.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Directions {
-    /// Latitude and longitude.
-    Equirect(Equirect),
-    /// Six square faces of `edge` pixels, one below the other, +X −X +Y −Y +Z −Z of the frame.
-    Cube { edge: usize, frame: Frame },
 }
 
 impl Device {

@@ -8,11 +8,15 @@
 #[cfg(feature = "learn")]
 mod allocator;
 mod args;
+mod cli;
 mod commands;
 mod device;
+mod features;
 #[cfg(feature = "learn")]
-mod loading;
+mod latent_files;
+mod numbers;
 mod output;
+mod part;
 mod picture;
 mod progress;
 mod report;
@@ -29,9 +33,9 @@ use clap::Parser;
 use crate::report::{Outcome, Report};
 
 fn main() -> ExitCode {
-    let cli = args::Cli::parse();
+    let cli = cli::Cli::parse();
     let report = Report::new(cli.json, cli.quiet);
-    match commands::run(cli.command, report) {
+    match cli.command.run(report) {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,
         Ok(Outcome::Negative) => ExitCode::from(1),
         Err(error) if report::is_closed_pipe(&error) => ExitCode::SUCCESS,

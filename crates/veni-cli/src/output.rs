@@ -5,14 +5,11 @@ use std::fs::OpenOptions;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use veni_light::Error;
-use veni_light::output::{Overwrite, process_token, refuse_existing};
+use veni_light::output::{self, Overwrite, process_token};
 use veni_image::{WriteOptions, write_rows};
 use veni_light::sphere::Equirect;
-
-#[cfg(feature = "learn")]
-use crate::shard::Shard;
 
 /// Attribute of a baked image: the latent's JSON.
 pub(crate) const LATENT: &str = "veni:latent";
@@ -47,36 +44,6 @@ pub(crate) fn check(paths: &[PathBuf], extensions: &[&str], overwrite: Overwrite
         }
     }
     Ok(())
-}
-
-/// Where the results for `inputs` go: to the single `output`, or into `folder` under the inputs' names with another
-/// extension; nowhere (stdout) if neither is given. Those of this process's share are checked before any work; the
-/// names of all of them must differ.
-#[cfg(feature = "learn")]
-pub(crate) fn one_per_input(
-    inputs: &[PathBuf],
-    output: Option<&PathBuf>,
-    folder: Option<&PathBuf>,
-    extension: &str,
-    overwrite: Overwrite,
-    shard: Shard,
-) -> Result<Vec<PathBuf>> {
-    let names = match (output, folder) {
-        (Some(_), _) if inputs.len() > 1 => {
-            bail!("-o names one file for {} inputs: name a folder with --out-dir DIR", inputs.len())
-        }
-        (Some(output), _) => vec![output.clone()],
-        (None, None) => return Ok(Vec::new()),
-        (None, Some(folder)) => inputs.iter().map(|i| named(folder, i, extension)).collect::<Result<_>>()?,
-    };
-    check_distinct(&names)?;
-    let own = shard.own(&names);
-    if let Some(folder) = folder {
-        own.iter().try_for_each(|f| refuse_existing(f, overwrite))?;
-        create_folder(folder)?;
-    }
-    check(&own, &[extension], overwrite)?;
-    Ok(names)
 }
 
 /// Creates a folder for results unless it is there; several processes may do so at once.
@@ -143,10 +110,17 @@ pub(crate) fn writable(folder: &Path, wanted: &Path) -> Result<()> {
     }
 }
 
-/// Adds what to do to an error of the system while writing.
+/// Refuses a file that exists and may not be replaced, and says which option replaces it.
+pub(crate) fn refuse_existing(path: &Path, overwrite: Overwrite) -> Result<()> {
+    output::refuse_existing(path, overwrite).map_err(with_remedy)
+}
+
+/// Adds what can be done here, of which the library knows nothing.
 pub(crate) fn with_remedy(error: Error) -> anyhow::Error {
     let remedy = match &error {
-        Error::Io { action: "write", cause, .. } => match cause.kind() {
+        Error::Exists { .. } => return anyhow!("{error}; --force replaces it"),
+        Error::LowRange { .. } => return anyhow!("{error}, as 'veni-cli prepare' does"),
+        Error::Io { action: "write", source, .. } => match source.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
                 "free some space or name another disk"
             }
@@ -157,7 +131,7 @@ pub(crate) fn with_remedy(error: Error) -> anyhow::Error {
         },
         _ => return error.into(),
     };
-    anyhow::anyhow!("{error}; nothing was kept of this file: {remedy}")
+    anyhow!("{}; nothing was kept of this file: {remedy}", error.with_source())
 }
 
 /// Takes rows of linear radiance from the top down.

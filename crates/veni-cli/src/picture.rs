@@ -9,7 +9,6 @@ use veni_image::Panorama;
 use veni_image::tonemap::Tonemap;
 use veni_light::sphere::{Equirect, Frame};
 
-use crate::commands::bake::{FrameName, Layout};
 use crate::device::{Baker, Directions};
 use crate::output::{CUBE_FACES, FRAME, LATENT, MODEL};
 use crate::size::Size;
@@ -18,6 +17,29 @@ use crate::size::Size;
 const WIDTH: usize = 1024;
 /// Default edge of a cube face: the same resolution at the centre of a face.
 const EDGE: usize = WIDTH / 4;
+
+/// How directions are laid out in the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Layout {
+    /// Latitude and longitude, twice as wide as high
+    #[default]
+    Equirect,
+    /// Six faces, one below the other
+    Cubemap,
+}
+
+/// The frames by the names that are typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FrameName {
+    /// z up, the image's centre looks along +x (also native to this program)
+    Blender,
+    /// y up, centre +x (glTF, three.js)
+    Gltf,
+    /// y up, centre +z (OpenEXR, USD)
+    Openexr,
+    /// y up, centre -z
+    Bevy,
+}
 
 /// An image to bake.
 pub(crate) struct Picture {

@@ -1,122 +1,110 @@
 //! Progress on stderr: a bar on a terminal, a plain line every few seconds in a log, nothing with `--quiet`.
 
-use std::io::IsTerminal;
-use std::time::{Duration, Instant};
+mod bar;
+#[cfg(feature = "learn")]
+mod library;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::report::{Report, to_stderr};
+use crate::report::Report;
+use bar::Bar;
 
-/// Work shorter than this shows no progress at all.
-const PATIENCE: Duration = Duration::from_millis(700);
-/// The bar is drawn at most this often: a slow terminal must not hold up the work.
-const FRAME: Duration = Duration::from_millis(100);
-/// At most one plain line in this time.
-const LINE_INTERVAL: Duration = Duration::from_secs(5);
+pub(crate) use bar::duration;
 
-/// How far a piece of work of known length has come.
-pub(crate) struct Progress {
-    what: &'static str,
-    total: u64,
-    /// Where it stood at `started` (a resumed run does not start at 0).
-    first: u64,
-    started: Instant,
-    shown: Option<Instant>,
-    view: View,
+/// What a command shows of its work: one bar at a time, that of what began last. Several threads may tell it.
+pub(crate) struct Bars {
+    report: Report,
+    current: Mutex<Option<Work>>,
 }
 
-enum View {
-    Silent,
-    Lines,
-    Bar(ProgressBar),
+/// The work that began last.
+struct Work {
+    bar: Bar,
+    what: String,
+    done: u64,
+    #[cfg(feature = "learn")]
+    total: Option<u64>,
 }
 
-impl Progress {
-    /// Progress from `first` towards `total` units of `what` ("row", "step").
-    pub(crate) fn start(report: Report, what: &'static str, first: u64, total: u64) -> Self {
-        let view = if report.is_quiet() {
-            View::Silent
-        } else if std::io::stderr().is_terminal() {
-            let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
-            let template = "{bar:24.cyan/dim} {pos}/{len} {prefix} · {eta} left{wide_msg}";
-            // the template is a constant; a wrong one would show in the first test
-            bar.set_style(ProgressStyle::with_template(template).unwrap_or(ProgressStyle::default_bar()));
-            bar.set_prefix(format!("{what}s"));
-            bar.set_position(first);
-            bar.reset_eta();
-            View::Bar(bar)
-        } else {
-            View::Lines
-        };
-        Self { what, total, first, started: Instant::now(), shown: None, view }
+impl Bars {
+    pub(crate) fn new(report: Report) -> Self {
+        Self { report, current: Mutex::new(None) }
     }
 
-    /// `done` units are done; `detail` is only asked for when it will be shown.
-    pub(crate) fn set(&mut self, done: u64, detail: impl FnOnce() -> String) {
-        let waited = self.started.elapsed();
-        match &self.view {
-            View::Silent => {}
-            View::Bar(bar) => {
-                let due = self.shown.map_or(waited >= PATIENCE, |last| last.elapsed() >= FRAME);
-                if !due {
-                    return;
-                }
-                if self.shown.is_none() {
-                    bar.set_draw_target(ProgressDrawTarget::stderr());
-                }
-                self.shown = Some(Instant::now());
-                let detail = detail();
-                bar.set_message(if detail.is_empty() { detail } else { format!(" · {detail}") });
-                bar.set_position(done);
-            }
-            View::Lines => {
-                if self.shown.unwrap_or(self.started).elapsed() < LINE_INTERVAL {
-                    return;
-                }
-                self.shown = Some(Instant::now());
-                let line = line(self.what, done, self.first, self.total, waited, &detail());
-                to_stderr(&format!("{line}\n"));
-            }
+    /// Work of `total` units ("row", "step") begins; `what` says which, if there are several kinds in one command.
+    pub(crate) fn begin(&self, what: &str, unit: &str, total: Option<u64>) {
+        self.begin_after(0, what, unit, total);
+    }
+
+    /// The same for work of which `done` units were done earlier: they say nothing about the time that the rest takes.
+    pub(crate) fn begin_after(&self, done: u64, what: &str, unit: &str, total: Option<u64>) {
+        let mut current = self.current();
+        end(&mut current);
+        *current = Some(Work {
+            bar: Bar::start(self.report, unit, done, total),
+            what: what.to_owned(),
+            done,
+            #[cfg(feature = "learn")]
+            total,
+        });
+    }
+
+    /// `done` units are done in all.
+    #[cfg(any(feature = "learn", test))]
+    pub(crate) fn advance(&self, done: u64, message: &str) {
+        if let Some(work) = self.current().as_mut() {
+            work.advance(done, message);
         }
     }
 
-    /// A remark between two updates, above the bar if there is one.
+    /// So many more are.
+    pub(crate) fn add(&self, units: u64) {
+        if let Some(work) = self.current().as_mut() {
+            work.advance(work.done + units, "");
+        }
+    }
+
+    /// A remark, above the bar if there is one.
     #[cfg(feature = "learn")]
     pub(crate) fn note(&self, text: &str) {
-        match &self.view {
-            View::Silent => {}
-            View::Bar(bar) if self.shown.is_some() => bar.println(text),
-            View::Bar(_) | View::Lines => to_stderr(&format!("{text}\n")),
+        match self.current().as_ref() {
+            Some(work) => work.bar.note(text),
+            None => self.report.note(text),
         }
     }
 
-    /// Removes the bar, so that what follows starts on a clean line.
-    pub(crate) fn finish(self) {
-        if let View::Bar(bar) = self.view {
-            bar.finish_and_clear();
-        }
+    /// Takes the bar away, so that what follows starts on a clean line.
+    pub(crate) fn end(&self) {
+        end(&mut self.current());
+    }
+
+    /// A panic in another thread is reported there; the bar is whole between calls.
+    fn current(&self) -> MutexGuard<'_, Option<Work>> {
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-fn line(what: &str, done: u64, first: u64, total: u64, waited: Duration, detail: &str) -> String {
-    let left = match done.saturating_sub(first) {
-        0 => "?".to_owned(),
-        progress => {
-            let rate = waited.as_secs_f64() / progress as f64;
-            duration(Duration::from_secs_f64(rate * total.saturating_sub(done) as f64))
-        }
-    };
-    let detail = if detail.is_empty() { String::new() } else { format!(", {detail}") };
-    format!("{what} {done}/{total}{detail}, {left} left")
+impl Drop for Bars {
+    fn drop(&mut self) {
+        self.end();
+    }
 }
 
-/// A time span as a person says it: "41 s", "12 min", "3 h 05 min".
-pub(crate) fn duration(span: Duration) -> String {
-    let seconds = span.as_secs_f64().round() as u64;
-    match seconds {
-        0..120 => format!("{seconds} s"),
-        120..7200 => format!("{} min", (seconds + 30) / 60),
-        _ => format!("{} h {:02} min", seconds / 3600, seconds % 3600 / 60),
+impl Work {
+    /// Threads may overtake one another: what is done never becomes less.
+    fn advance(&mut self, done: u64, message: &str) {
+        self.done = self.done.max(done);
+        let what = &self.what;
+        self.bar.set(self.done, || match (what.is_empty(), message.is_empty()) {
+            (false, false) => format!("{what}, {message}"),
+            _ => format!("{what}{message}"),
+        });
+    }
+}
+
+fn end(current: &mut Option<Work>) {
+    if let Some(work) = current.take() {
+        work.bar.finish();
     }
 }
 
@@ -125,18 +113,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_left_counts_from_where_a_run_was_resumed() {
-        let ten = Duration::from_secs(10);
-        assert_eq!(line("step", 60, 50, 100, ten, "loss 0.5"), "step 60/100, loss 0.5, 40 s left");
-        assert_eq!(line("step", 50, 50, 100, ten, ""), "step 50/100, ? left");
-    }
-
-    #[test]
-    fn durations_are_readable() {
-        for (seconds, text) in
-            [(0, "0 s"), (119, "119 s"), (125, "2 min"), (7100, "118 min"), (11100, "3 h 05 min")]
-        {
-            assert_eq!(duration(Duration::from_secs(seconds)), text);
-        }
+    fn what_is_done_never_becomes_less_and_new_work_begins_anew() {
+        let bars = Bars::new(Report::new(false, true));
+        let done = || bars.current().as_ref().map(|work| work.done);
+        bars.advance(3, "");
+        assert_eq!(done(), None, "nothing has begun");
+        bars.begin_after(2, "", "row", Some(9));
+        assert_eq!(done(), Some(2));
+        bars.advance(5, "");
+        bars.advance(4, "late");
+        bars.add(2);
+        assert_eq!(done(), Some(7));
+        bars.begin("", "row", None);
+        assert_eq!(done(), Some(0));
+        bars.end();
+        assert_eq!(done(), None);
     }
 }

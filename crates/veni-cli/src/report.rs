@@ -60,6 +60,22 @@ pub(crate) fn error(error: &anyhow::Error) {
     to_stderr(&format!("veni-cli: {}\n", one_line(&format!("{error:#}"))));
 }
 
+/// Does `work` for each item and goes on after errors, unless nobody reads the results any more.
+pub(crate) fn each<T>(
+    items: impl IntoIterator<Item = T>,
+    mut work: impl FnMut(T) -> anyhow::Result<()>,
+) -> anyhow::Result<Outcome> {
+    let mut failed = Vec::new();
+    for item in items {
+        match work(item) {
+            Ok(()) => {}
+            Err(error) if is_closed_pipe(&error) => return Err(error),
+            Err(error) => failed.push(error),
+        }
+    }
+    last_of(failed)
+}
+
 /// Ends a command that went on after errors: the last one is for `main` to print, the others are printed here.
 pub(crate) fn last_of(mut errors: Vec<anyhow::Error>) -> anyhow::Result<Outcome> {
     let last = errors.pop();

@@ -5,21 +5,15 @@ use std::fmt::{self, Display};
 use anyhow::{Result, bail};
 use clap::Args;
 
+use crate::part::Part;
 use crate::report::Report;
 
 /// Which of a command's inputs this process takes.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub(crate) struct Shard {
     /// Take only every N-th input, beginning with the I-th: I of N processes that together do it all
-    #[arg(long = "shard", value_name = "I/N", value_parser = part)]
+    #[arg(long = "shard", value_name = "I/N", value_parser = Part::shard)]
     part: Option<Part>,
-}
-
-/// Part `number` of `of`, from 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Part {
-    number: usize,
-    of: usize,
 }
 
 impl Shard {
@@ -71,23 +65,12 @@ impl Display for Shard {
     }
 }
 
-fn part(text: &str) -> Result<Part, String> {
-    let numbers = text.split_once('/').map(|(number, of)| (number.trim().parse(), of.trim().parse()));
-    match numbers {
-        Some((Ok(number), Ok(of))) if 1 <= number && number <= of => Ok(Part { number, of }),
-        Some((Ok(_), Ok(0))) => Err("there are no shards of 0; count them from 1, as 1/4 to 4/4".to_owned()),
-        Some((Ok(0), Ok(of))) => Err(format!("shards are counted from 1: 1/{of} to {of}/{of}")),
-        Some((Ok(number), Ok(of))) => Err(format!("there is no shard {number} of {of}: 1/{of} to {of}/{of}")),
-        _ => Err("give I/N, such as 1/4".to_owned()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn shard(text: &str) -> Shard {
-        Shard { part: Some(part(text).unwrap()) }
+        Shard { part: Some(Part::shard(text).unwrap()) }
     }
 
     #[test]
@@ -101,22 +84,5 @@ mod tests {
         assert_eq!(shard("2/3").own(&[0, 1, 2, 3, 4]), [1, 4]);
         assert_eq!((shard("2/3").place(), shard("2/3").to_string().as_str()), ((1, 3), "2/3"));
         assert!((0..9).all(|index| Shard::default().pick(index)));
-    }
-
-    #[test]
-    fn what_is_no_shard_is_refused() {
-        for (text, words) in [
-            ("0/4", "from 1"),
-            ("5/4", "no shard 5"),
-            ("1/0", "no shards of 0"),
-            ("0/0", "no shards of 0"),
-            ("2", "1/4"),
-            ("a/b", "1/4"),
-            ("-1/4", "1/4"),
-            ("", "1/4"),
-        ] {
-            let message = part(text).unwrap_err();
-            assert!(message.contains(words), "{text}: {message}");
-        }
     }
 }

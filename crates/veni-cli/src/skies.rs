@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use veni_light::output::{Overwrite, refuse_existing};
+use veni_light::latent::Latent;
+use veni_light::output::Overwrite;
 
+use crate::numbers::{finite, stops};
 use crate::output;
 use crate::report::Report;
 use crate::shard::Shard;
@@ -48,6 +50,30 @@ pub(crate) struct Many {
 
     #[command(flatten)]
     pub(crate) shard: Shard,
+}
+
+/// What is done to a sky before it is used.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Change {
+    /// Turn the sky about the vertical axis, counter-clockwise seen from above
+    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = finite, allow_hyphen_values = true,
+        hide_default_value = true)]
+    pub(crate) turn: f64,
+
+    /// Make the sky brighter (or, negative, darker) by factors of two
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = stops, allow_hyphen_values = true,
+        hide_default_value = true)]
+    pub(crate) exposure: f64,
+}
+
+impl Change {
+    /// The changed latent: what files record.
+    pub(crate) fn of(self, latent: &Latent) -> Latent {
+        let mut latent =
+            if self.turn == 0.0 { latent.clone() } else { latent.turned(self.turn.to_radians()) };
+        latent.log_exposure += (self.exposure * std::f64::consts::LN_2) as f32;
+        latent
+    }
 }
 
 /// Formats by extension.
@@ -115,7 +141,7 @@ pub(crate) fn jobs(
     let images = |jobs: &[Job]| jobs.iter().flat_map(|job| job.files.clone()).collect::<Vec<_>>();
     output::check_distinct(&images(&jobs))?;
     let jobs = many.shard.own(&jobs);
-    images(&jobs).iter().try_for_each(|file| refuse_existing(file, overwrite))?;
+    images(&jobs).iter().try_for_each(|file| output::refuse_existing(file, overwrite))?;
     output::create_folder(folder)?;
     output::check(&images(&jobs), &EXTENSIONS, overwrite)?;
     Ok(jobs)

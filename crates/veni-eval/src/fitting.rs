@@ -71,7 +71,7 @@ impl FitSettings {
         let images: Vec<_> = images.iter().map(|image| averaged(grid, image, self.factor)).collect();
         let images: Vec<_> = images.iter().map(Vec::as_slice).collect();
         let grid = coarse_grid(grid, self.factor);
-        let target = FitTarget::panoramas(grid, &images);
+        let target = FitTarget::panoramas(grid, &images)?;
         fit::fit(subject.fit_decoder(), &target, start, &self.config)
     }
 }

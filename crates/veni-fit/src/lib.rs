@@ -32,5 +32,5 @@ pub use fit::{
     Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective, PanoramaLoss,
     Plateau, best_light, best_of, fit, fit_shaded, fit_with, from_each, matching_exposure, random_starts,
 };
-pub use observation::{Observation, Picture};
+pub use observation::Observation;
 pub use veni_light::{Error, Result};

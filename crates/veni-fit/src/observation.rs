@@ -4,25 +4,12 @@ use std::f32::consts::TAU;
 
 use crate::FitTarget;
 use veni_image::LUMINANCE;
-use veni_image::Panorama;
+use veni_image::{Panorama, Picture};
 use veni_light::sphere::{Equirect, View};
 use crate::{Error, Result};
 
 /// A cell counts as unknown if less of it is known.
 const LEAST_KNOWN: f32 = 0.1;
-
-/// A picture of linear radiance, and what is known about its pixels. Row-major from the top left.
-#[derive(Clone, Debug)]
-pub struct Picture<'a> {
-    /// Width and height.
-    pub size: [usize; 2],
-    /// Linear radiance; a value that is not finite makes its pixel unknown.
-    pub pixels: &'a [[f32; 3]],
-    /// How much of each pixel is known, 0 to 1; absent: all of it.
-    pub known: Option<&'a [f32]>,
-    /// Values at or above this are clipped: the truth is at least that.
-    pub clip: Option<f32>,
-}
 
 /// One image, ready to be fitted.
 #[derive(Clone, Debug)]
@@ -46,22 +33,21 @@ impl Observation {
     /// pixels.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the lengths do not match or nothing positive is known.
-    pub fn panorama(picture: &Picture<'_>, grid: Equirect) -> Result<Self> {
-        picture.check()?;
-        let source = Equirect::new(picture.size[0], picture.size[1]);
+    /// [`Error::Invalid`] if no known pixel has positive radiance.
+    pub fn panorama(picture: &Picture, grid: Equirect) -> Result<Self> {
+        let source = Equirect::new(picture.size()[0], picture.size()[1]);
         if source.width != 2 * source.height {
             return Err(Error::invalid(format!(
-                "{} × {} is no panorama: its width must be twice its height; say how a photograph was taken \
+                "{} × {} is not a panorama: its width must be twice its height; say how a photograph was taken \
                  (field of view and direction)",
                 source.width, source.height
             )));
         }
-        let (pixels, known) = picture.split();
+        let (pixels, known) = split(picture);
         let grey = |values: &[f32]| -> Vec<[f32; 3]> { values.iter().map(|v| [*v; 3]).collect() };
         let sums = Panorama::new(source, pixels).resample(grid);
         let known = Panorama::new(source, grey(&known)).resample(grid);
-        let clips = picture.clipped().map(|c| Panorama::new(source, c).resample(grid));
+        let clips = clipped(picture).map(|c| Panorama::new(source, c).resample(grid));
         let areas: Vec<f32> = (0..grid.height)
             .flat_map(|j| std::iter::repeat_n(grid.solid_angle(j) as f32, grid.width))
             .collect();
@@ -74,20 +60,19 @@ impl Observation {
     ///
     /// # Errors
     /// As [`Observation::panorama`]; also if `view` is none (a field of view of 0 or of half a turn).
-    pub fn photograph(picture: &Picture<'_>, view: &View, longest: usize) -> Result<Self> {
-        picture.check()?;
+    pub fn photograph(picture: &Picture, view: &View, longest: usize) -> Result<Self> {
         if !view.is_valid() {
             let degrees = view.fov.to_degrees();
             return Err(Error::invalid(format!(
                 "a field of view of {degrees}°: it must lie between 0 and 180, and all angles must be finite"
             )));
         }
-        let [width, height] = picture.size;
+        let [width, height] = picture.size();
         let cell = width.max(height).div_ceil(longest.max(1)).max(1);
         // whole cells only, centred
         let [w, h] = [(width / cell).max(1), (height / cell).max(1)];
-        let (pixels, known) = picture.split();
-        let clips = picture.clipped();
+        let (pixels, known) = split(picture);
+        let clips = clipped(picture);
         let [cw, ch] = [cell.min(width), cell.min(height)];
         let [left, top] = [(width - w * cw) / 2, (height - h * ch) / 2];
         let average = |at: &dyn Fn(usize) -> [f32; 3]| -> Vec<[f32; 3]> {
@@ -131,7 +116,7 @@ impl Observation {
         // a channel that is 0 has no logarithm: the darkest value that is known stands for it
         let counted = radiance.iter().zip(known.iter().flat_map(|k| [*k; 3]));
         let darkest = counted.filter(|(v, k)| *k > 0.0 && **v > 0.0).map(|(v, _)| *v).reduce(f32::min);
-        let darkest = darkest.ok_or_else(|| Error::invalid("nothing of the picture is known and above 0"))?;
+        let darkest = darkest.ok_or_else(|| Error::invalid("no known pixel of the picture has positive radiance"))?;
         let mut log_radiance: Vec<f32> = radiance.iter().map(|v| v.max(darkest).ln()).collect();
         let (mut sum, mut total) = (0.0f64, 0.0f64);
         for ((rgb, known), area) in radiance.chunks_exact(3).zip(&known).zip(areas) {
@@ -168,55 +153,42 @@ impl Observation {
         (0..self.grid.len()).map(|p| known(p) * area(p)).sum::<f32>() / (2.0 * TAU)
     }
 
-    /// Hands the target of a fit to `use_target`.
-    pub fn with_target<T>(&self, use_target: impl FnOnce(&FitTarget<'_>) -> T) -> T {
-        let images = [self.log_radiance.as_slice()];
-        let masks = self.mask.as_ref().map(|m| [m.as_slice()]);
-        let clipped = self.clipped.as_ref().map(|c| [c.as_slice()]);
-        let view = self.view.as_ref();
-        use_target(&FitTarget {
-            directions: view.map(|(d, _)| d.as_slice()),
-            areas: view.map(|(_, a)| a.as_slice()),
-            masks: masks.as_ref().map(|m| m.as_slice()),
-            clipped: clipped.as_ref().map(|c| c.as_slice()),
-            ..FitTarget::panoramas(self.grid, &images)
-        })
+    /// The target of a fit.
+    pub fn target(&self) -> FitTarget<'_> {
+        let consistent = "an observation is consistent";
+        let mut target = FitTarget::panoramas(self.grid, &[&self.log_radiance]).expect(consistent);
+        if let Some((directions, areas)) = &self.view {
+            target = target.in_directions(directions.as_slice(), Some(areas)).expect(consistent);
+        }
+        if let Some(mask) = &self.mask {
+            target = target.masked(&[mask]).expect(consistent);
+        }
+        if let Some(clipped) = &self.clipped {
+            target = target.clipped(&[clipped]).expect(consistent);
+        }
+        target
     }
 }
 
-impl Picture<'_> {
-    fn check(&self) -> Result<()> {
-        let [width, height] = self.size;
-        let count = width * height;
-        if count == 0 || self.pixels.len() != count || self.known.is_some_and(|k| k.len() != count) {
-            return Err(Error::invalid(format!(
-                "a picture of {width} × {height} has {} pixels and a mask of {}",
-                self.pixels.len(),
-                self.known.map_or(count, <[_]>::len)
-            )));
-        }
-        Ok(())
-    }
+/// Radiance × known, and known; both 0 where a value is not finite.
+fn split(picture: &Picture) -> (Vec<[f32; 3]>, Vec<f32>) {
+    let (pixels, mask) = (picture.pixels(), picture.known());
+    let known = |p: usize| {
+        let finite = pixels[p].iter().all(|v| v.is_finite());
+        // NaN in a mask is unknown too
+        if finite { mask.map_or(1.0, |k| k[p].clamp(0.0, 1.0).max(0.0)) } else { 0.0 }
+    };
+    let known: Vec<f32> = (0..pixels.len()).map(known).collect();
+    let weighted = |(rgb, k): (&[f32; 3], &f32)| {
+        if *k > 0.0 { rgb.map(|v| v.max(0.0) * k) } else { [0.0; 3] }
+    };
+    (pixels.iter().zip(&known).map(weighted).collect(), known)
+}
 
-    /// Radiance × known, and known; both 0 where a value is no number.
-    fn split(&self) -> (Vec<[f32; 3]>, Vec<f32>) {
-        let known = |p: usize| {
-            let finite = self.pixels[p].iter().all(|v| v.is_finite());
-            // NaN in a mask is unknown too
-            if finite { self.known.map_or(1.0, |k| k[p].clamp(0.0, 1.0).max(0.0)) } else { 0.0 }
-        };
-        let known: Vec<f32> = (0..self.pixels.len()).map(known).collect();
-        let weighted = |(rgb, k): (&[f32; 3], &f32)| {
-            if *k > 0.0 { rgb.map(|v| v.max(0.0) * k) } else { [0.0; 3] }
-        };
-        (self.pixels.iter().zip(&known).map(weighted).collect(), known)
-    }
-
-    /// 1 for every clipped value.
-    fn clipped(&self) -> Option<Vec<[f32; 3]>> {
-        let clip = self.clip?;
-        Some(self.pixels.iter().map(|rgb| rgb.map(|v| if v >= clip { 1.0 } else { 0.0 })).collect())
-    }
+/// 1 for every clipped value.
+fn clipped(picture: &Picture) -> Option<Vec<[f32; 3]>> {
+    let clip = picture.clip()?;
+    Some(picture.pixels().iter().map(|rgb| rgb.map(|v| if v >= clip { 1.0 } else { 0.0 })).collect())
 }
 
 #[cfg(test)]

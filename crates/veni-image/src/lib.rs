@@ -8,6 +8,7 @@
 //! |---|---|
 //! | OpenEXR and Radiance `.hdr` files | [`Panorama::read`], [`Panorama::read_with`], [`attributes`] |
 //! | PNG, JPEG, WebP, and radiance from them | [`LdrPanorama`] |
+//! | pictures of any shape, masks | [`Picture`], [`read_mask`] |
 //! | NaN, infinite, negative values | [`Panorama::sanitise`] |
 //! | other sizes, turned, mirrored | [`Panorama::resample`], [`Panorama::turn`], [`Panorama::mirror`] |
 //! | what the model works on | [`Panorama::log`], [`Panorama::mean_log_luminance`] |
@@ -19,6 +20,7 @@
 
 mod colour;
 pub mod metrics;
+mod picture;
 mod read;
 mod resample;
 mod sanitise;
@@ -34,6 +36,7 @@ use veni_light::sphere::Equirect;
 pub use veni_light::{Error, Result};
 
 pub use colour::{LUMINANCE, luminance};
+pub use picture::{Picture, read_mask};
 pub use read::{DEFAULT_MAX_PIXELS, LdrPanorama, ReadOptions, Transfer, attributes};
 pub use sanitise::{LOG_FLOOR, Sanitised, log_reference, sanitise_values};
 pub use write::{HalfRange, Precision, RADIANCE_SCALE, RowSink, WriteFormat, WriteOptions, write_rows};

@@ -1,37 +1,49 @@
-//! The one error type of this crate: three kinds a caller can act on.
+//! The one error type of this crate: kinds that a caller can act on.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// What went wrong. Messages name the file, the offending value and the remedy.
-#[derive(Debug)]
+/// What went wrong. Messages name the file, the offending value and the remedy, in the words of the library: which
+/// option or button a program has for it, the program adds.
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The data violates its format or a documented requirement (truncated file, NaN, wrong shape).
+    #[error("{0}")]
     Invalid(String),
     /// The data is well formed, but not something this crate reads or does.
+    #[error("{0}")]
     Unsupported(String),
+    /// An image whose format holds a display's range, where radiance is needed.
+    #[error("{}: {format} holds no high dynamic range; expand such panoramas into EXR files first", path.display())]
+    LowRange {
+        /// The image.
+        path: PathBuf,
+        /// Its format ("PNG").
+        format: &'static str,
+    },
+    /// A file that was to be written is there already, and [`Overwrite`](crate::output::Overwrite) refuses.
+    #[error("{}: exists already", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The data is, or claims to be, larger than a limit that protects the memory.
+    #[error("{0}")]
+    TooLarge(String),
+    /// The caller asked to stop.
+    #[error("cancelled")]
+    Cancelled,
     /// The operating system refused.
+    #[error("{}: cannot {action}", path.display())]
     Io {
         /// The file or folder concerned.
         path: PathBuf,
         /// What was being done, as an infinitive without "to" ("read", "create").
         action: &'static str,
-        /// The system's own word. It is part of the message, so it is no `source` beside it.
-        cause: std::io::Error,
+        /// The system's own word. The message leaves it to whoever prints the chain, or to [`Error::with_source`].
+        source: std::io::Error,
     },
 }
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Invalid(message) | Self::Unsupported(message) => f.write_str(message),
-            Self::Io { path, action, cause } => write!(f, "{}: cannot {action}: {cause}", path.display()),
-        }
-    }
-}
-
-impl std::error::Error for Error {}
 
 /// A result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -47,19 +59,69 @@ impl Error {
         Self::Unsupported(message.into())
     }
 
-    /// An [`Error::Io`] for `path`, e.g. `.map_err(|e| Error::io(path, "read", e))`.
-    pub fn io(path: impl AsRef<Path>, action: &'static str, cause: std::io::Error) -> Self {
-        Self::Io { path: path.as_ref().to_path_buf(), action, cause }
+    /// An [`Error::TooLarge`] from anything printable.
+    pub fn too_large(message: impl Into<String>) -> Self {
+        Self::TooLarge(message.into())
     }
 
-    /// The same error with `path: ` put before an invalid or unsupported message that lacks it.
+    /// An [`Error::Exists`] for `path`.
+    pub fn exists(path: impl AsRef<Path>) -> Self {
+        Self::Exists { path: path.as_ref().to_path_buf() }
+    }
+
+    /// An [`Error::Io`] for `path`, e.g. `.map_err(|e| Error::io(path, "read", e))`.
+    pub fn io(path: impl AsRef<Path>, action: &'static str, source: std::io::Error) -> Self {
+        Self::Io { path: path.as_ref().to_path_buf(), action, source }
+    }
+
+    /// The same error with `path: ` put before its message, unless the message begins with that already or the error
+    /// has a path of its own.
     #[must_use]
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
-        let path = path.as_ref().display();
+        let prefix = format!("{}: ", path.as_ref().display());
+        let named = |message: String| {
+            if message.starts_with(&prefix) { message } else { format!("{prefix}{message}") }
+        };
         match self {
-            Self::Invalid(m) => Self::Invalid(format!("{path}: {m}")),
-            Self::Unsupported(m) => Self::Unsupported(format!("{path}: {m}")),
-            io @ Self::Io { .. } => io,
+            Self::Invalid(message) => Self::Invalid(named(message)),
+            Self::Unsupported(message) => Self::Unsupported(named(message)),
+            Self::TooLarge(message) => Self::TooLarge(named(message)),
+            other @ (Self::LowRange { .. } | Self::Exists { .. } | Self::Cancelled | Self::Io { .. }) => {
+                other
+            }
         }
+    }
+
+    /// The message and, behind it, what the system said: for where there is one line and no chain.
+    pub fn with_source(&self) -> String {
+        match self {
+            Self::Io { source, .. } => format!("{self}: {source}"),
+            _ => self.to_string(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::error::Error as _;
+
+    #[test]
+    fn a_file_is_named_once() {
+        let wrong = "is wrong";
+        for error in [Error::invalid(wrong), Error::unsupported(wrong), Error::too_large(wrong)] {
+            assert_eq!(error.in_file("a.exr").in_file("a.exr").to_string(), "a.exr: is wrong");
+        }
+        assert_eq!(Error::exists("a.exr").in_file("b.exr").to_string(), "a.exr: exists already");
+    }
+
+    #[test]
+    fn what_the_system_said_is_the_source_and_not_in_the_message() {
+        let refused = || std::io::Error::other("disk on fire");
+        let error = Error::io("a.exr", "read", refused());
+        assert_eq!(error.to_string(), "a.exr: cannot read");
+        assert_eq!(error.source().map(ToString::to_string), Some("disk on fire".to_owned()));
+        assert_eq!(error.with_source(), "a.exr: cannot read: disk on fire");
+        assert_eq!(Error::invalid("odd").with_source(), "odd");
     }
 }

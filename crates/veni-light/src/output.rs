@@ -9,7 +9,7 @@ use crate::{Error, Result};
 /// Whether an existing file may be replaced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Overwrite {
-    /// Refuse with [`Error::Invalid`]; nothing is touched. The default.
+    /// Refuse with [`Error::Exists`]; nothing is touched. The default.
     #[default]
     Refuse,
     /// Replace it once the new content is complete.
@@ -19,7 +19,7 @@ pub enum Overwrite {
 /// Calls `write` with a new file beside `path`, syncs it and renames it to `path`.
 ///
 /// # Errors
-/// [`Error::Invalid`] if `path` exists and may not be replaced; otherwise what `write` or the system says.
+/// [`Error::Exists`] if `path` exists and may not be replaced; otherwise what `write` or the system says.
 /// After any error the new file is removed and a previous file at `path` is as it was.
 pub fn write_atomic(
     path: &Path,
@@ -46,10 +46,10 @@ pub fn write_atomic(
 /// The check of [`write_atomic`] alone, for commands that should refuse before a long computation.
 ///
 /// # Errors
-/// [`Error::Invalid`] if `path` exists and `overwrite` is [`Overwrite::Refuse`].
+/// [`Error::Exists`] if `path` exists and `overwrite` is [`Overwrite::Refuse`].
 pub fn refuse_existing(path: &Path, overwrite: Overwrite) -> Result<()> {
     if overwrite == Overwrite::Refuse && path.symlink_metadata().is_ok() {
-        return Err(Error::invalid(format!("{}: exists already; --force replaces it", path.display())));
+        return Err(Error::exists(path));
     }
     Ok(())
 }

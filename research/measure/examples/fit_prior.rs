@@ -55,7 +55,7 @@ fn main() -> Result<()> {
     );
     println!("|---|---|---|---|---|---|---|");
     for (row, weight) in weights.iter().enumerate() {
-        let target = FitTarget { prior: Some(&prior), ..FitTarget::panoramas(grid, &coarse) };
+        let target = FitTarget::panoramas(grid, &coarse)?.with_prior(&prior);
         let config = FitConfig { prior: *weight, ..FitConfig::thorough() };
         let latents = fit(FitDecoder::from(&decoder), &target, &starts, &config)?.latents;
         let decode = |latent: &Latent| decoded(&decoder, latent, grid);

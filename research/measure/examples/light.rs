@@ -78,7 +78,7 @@ fn look(model: &Model, image: &[f32], factor: usize, share: f64) -> Result<Look>
     let coarse = averaged(GRID, image, factor);
     let images = [coarse.as_slice()];
     let target =
-        FitTarget { prior: Some(&prior), ..FitTarget::panoramas(coarse_grid(GRID, factor), &images) };
+        FitTarget::panoramas(coarse_grid(GRID, factor), &images)?.with_prior(&prior);
     let objective = if share > 0.0 { Objective::Energy { share } } else { Objective::LogError };
     let prior_weight = FitConfig::prior_for(start[0].vectors.len());
     let config = FitConfig { objective, prior: prior_weight, ..FitConfig::thorough() };

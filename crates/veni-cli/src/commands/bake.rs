@@ -11,55 +11,58 @@ use veni_light::output::Overwrite;
 use veni_image::tonemap::{Curve, Tonemap};
 use veni_image::{Precision, WriteFormat, WriteOptions};
 
-use crate::args::{DecodeDevice, Force, ModelArgs};
+use crate::args::{Decoding, Force};
 use crate::device::Device;
+use crate::features::{GPU, LEARN, only};
 use crate::output::{self, with_remedy};
-use crate::picture::{Picture, preview_tonemap};
-use crate::progress::Progress;
+use crate::picture::{FrameName, Layout, Picture, preview_tonemap};
+use crate::progress::Bars;
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
-use crate::skies::{self, Job, Many, Sky, Target};
+use crate::skies::{self, Change, Job, Many, Sky, Target};
 use crate::source::{self, Loaded};
 
 /// The largest finite half-precision number.
 const HALF_MAX: f32 = 65504.0;
 
-/// Largest |exposure|. Light that is 2^64 brighter than a sky is no light, and close to what an f32 can hold.
-const MAX_STOPS: f64 = 64.0;
-
 /// Stands where no PNG is written.
 const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
+
+/// What a graphics card changes.
+const DEVICES: &str = "Devices: a graphics card bakes the same picture as the CPU to within rounding, and large ones \
+    faster; the result says what was used. It needs the card's own driver for Vulkan, Metal or Direct3D 12, and \
+    nothing else. 'veni-cli inspect --devices' lists what there is, 'veni-cli bench' measures it.\n\n";
 
 /// Bake a sky to image files
 #[derive(Args, Debug)]
 #[command(
     group = ArgGroup::new("sky").required(true),
-    long_about = "Bake a sky to image files.\n\n\
-        The sky is a latent: a latent file (JSON), an image that this program baked (its latent is inside), an HDR \
-        panorama (encoded on the fly), or a random one named by --seed. The same seed and model give the same sky \
+    long_about = format!("Bake a sky to image files.\n\n\
+        The sky is a latent: a latent file (JSON), an image that this program baked (its latent is inside), {}or a \
+        random one named by --seed. The same seed and model give the same sky \
         for ever.\n\n\
         Several skies, or --count random ones, go to --out-dir, each named after its file or seed.\n\n\
         Formats by extension: .exr (linear, half or float), .hdr (Radiance RGBE), .png (tonemapped preview). An \
         EXR or HDR file carries its latent and the model's hash, so that it can be baked again at any size.",
-    after_help = "Cube maps: six square faces stacked from top to bottom in the order +X -X +Y -Y +Z -Z of --frame, \
+        only(LEARN, "an HDR panorama (encoded on the fly), ")),
+    after_help = format!("Cube maps: six square faces stacked from top to bottom in the order +X -X +Y -Y +Z -Z of --frame, \
         each oriented as the layers of a cube texture in Vulkan, Direct3D, Metal, OpenGL and WebGPU; the attribute \
         veni:cubeFaces repeats the order. With --frame bevy, z is negated before the lookup, as Bevy's shaders do. \
         Default frame: blender (z up); gltf for cube maps (y up).\n\n\
-        Devices: a graphics card bakes the same picture as the CPU to within rounding, and large ones faster; \
-        the result says what was used. It needs the card's own driver for Vulkan, Metal or Direct3D 12, and nothing \
-        else. 'veni-cli inspect --devices' lists what there is, 'veni-cli bench' measures it.\n\n\
-        Examples:\n  \
+        {}Examples:\n  \
         veni-cli bake --seed 7 -o sky.exr                      a random sky, 1024 x 512, half precision\n  \
         veni-cli bake --seed 7 -o sky.exr -o sky.png --size 4096\n  \
         veni-cli bake sky.exr -o turned.exr --turn 90 --exposure -1\n  \
-        veni-cli bake photo.hdr -o relit.exr                   through the encoder\n  \
-        veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512\n  \
+        {}veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512\n  \
         veni-cli bake latents/*.json --out-dir skies --format exr,png\n  \
-        veni-cli bake --seed 0 --count 1000 --out-dir skies --shard 2/4    the second of four processes\n  \
-        veni-cli bake --seed 7 -o sky.exr --device cpu         the same bits whatever card there is"
+        veni-cli bake --seed 0 --count 1000 --out-dir skies --shard 2/4    the second of four processes{}",
+        only(GPU, DEVICES),
+        only(LEARN, "veni-cli bake photo.hdr -o relit.exr                   through the encoder\n  "),
+        only(GPU, "\n  veni-cli bake --seed 7 -o sky.exr --device cpu         the same bits whatever card there is"))
 )]
 pub(crate) struct Bake {
-    /// Latent files, baked images, or HDR panoramas
+    #[cfg_attr(feature = "learn", doc = "Latent files, baked images, or HDR panoramas")]
+    #[cfg_attr(not(feature = "learn"), doc = "Latent files, or baked images")]
     #[arg(group = "sky", value_name = "LATENT")]
     latents: Vec<PathBuf>,
 
@@ -74,15 +77,8 @@ pub(crate) struct Bake {
     #[arg(long, value_name = "W|WxH")]
     size: Option<Size>,
 
-    /// Turn the scene about the vertical axis, counter-clockwise seen from above
-    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = finite, allow_hyphen_values = true,
-        hide_default_value = true)]
-    turn: f64,
-
-    /// Make it brighter (or, negative, darker) by factors of two
-    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = stops, allow_hyphen_values = true,
-        hide_default_value = true)]
-    exposure: f64,
+    #[command(flatten)]
+    change: Change,
 
     /// EXR in half precision; fails where radiance exceeds 65504 [default: half if that holds it, else float]
     #[arg(long, conflicts_with = "float")]
@@ -101,40 +97,13 @@ pub(crate) struct Bake {
     frame: Option<FrameName>,
 
     #[command(flatten)]
-    model: ModelArgs,
-
-    /// What decodes
-    #[arg(long, value_enum, default_value_t)]
-    device: DecodeDevice,
+    decoding: Decoding,
 
     #[command(flatten)]
     force: Force,
 
     #[command(flatten)]
     many: Many,
-}
-
-/// How directions are laid out in the image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Layout {
-    /// Latitude and longitude, twice as wide as high
-    #[default]
-    Equirect,
-    /// Six faces, one below the other
-    Cubemap,
-}
-
-/// The frames by the names that are typed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum FrameName {
-    /// z up, the image's centre looks along +x (also native to this program)
-    Blender,
-    /// y up, centre +x (glTF, three.js)
-    Gltf,
-    /// y up, centre +z (OpenEXR, USD)
-    Openexr,
-    /// y up, centre -z
-    Bevy,
 }
 
 impl Bake {
@@ -146,18 +115,10 @@ impl Bake {
             Sky::File(path) => Some(path.as_path()),
             Sky::Seed(_) => None,
         });
-        let loaded = source::model_of(&self.model, files)?;
+        let loaded = source::model_of(&self.decoding.model, files)?;
         loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
-        let device = Device::open(self.device, &loaded.model, report)?;
-        let mut failed = Vec::new();
-        for job in jobs {
-            match self.one(&job, &picture, &loaded, &device, report) {
-                Ok(()) => {}
-                Err(error) if report::is_closed_pipe(&error) => return Err(error),
-                Err(error) => failed.push(error),
-            }
-        }
-        report::last_of(failed)
+        let device = Device::open(self.decoding.device, &loaded.model, report)?;
+        report::each(jobs, |job| self.one(&job, &picture, &loaded, &device, report))
     }
 
     /// One sky to its files.
@@ -174,7 +135,7 @@ impl Bake {
             Sky::File(path) => source::from_file(path, loaded, report)?,
             Sky::Seed(seed) => source::seeded(&loaded.model, *seed),
         };
-        let latent = self.changed(&named);
+        let latent = self.change.of(&named);
         let started = Instant::now();
         let baker = device.condition(&latent)?;
         let png = job.files.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")));
@@ -201,11 +162,11 @@ impl Bake {
             (_, true) => (Precision::Float, false),
             _ => (Precision::Half, true),
         };
+        let bars = Bars::new(report);
         loop {
             let (files, mut too_bright) = (files(precision)?, None);
             let watch = may_change && precision == Precision::Half && has_exr(&files);
-            let mut progress = Progress::start(report, "row", 0, picture.grid().height as u64);
-            let mut done = 0;
+            bars.begin("", "row", Some(picture.grid().height as u64));
             let result = output::write_all(&files, picture.grid(), &mut |push| {
                 baker.rows(picture.directions(), &mut |row| {
                     if watch
@@ -214,12 +175,11 @@ impl Bake {
                         too_bright = Some(*v);
                         return Err(veni_light::Error::invalid("beyond the range of half precision"));
                     }
-                    done += 1;
-                    progress.set(done, String::new);
+                    bars.add(1);
                     push(row)
                 })
             });
-            progress.finish();
+            bars.end();
             match (result, too_bright) {
                 (_, Some(value)) => {
                     report.note(format_args!(
@@ -235,14 +195,6 @@ impl Bake {
             }
         }
         self.report(&job.files, picture, &latent, precision, device.name(), started, report)
-    }
-
-    /// The latent with `--turn` and `--exposure` in it: what the files record.
-    fn changed(&self, latent: &Latent) -> Latent {
-        let mut latent =
-            if self.turn == 0.0 { latent.clone() } else { latent.turned(self.turn.to_radians()) };
-        latent.log_exposure += (self.exposure * std::f64::consts::LN_2) as f32;
-        latent
     }
 
     #[allow(clippy::too_many_arguments, reason = "all that is said of a file")]
@@ -285,19 +237,4 @@ impl Bake {
 
 fn has_exr(files: &[(PathBuf, WriteOptions)]) -> bool {
     files.iter().any(|(_, options)| matches!(options.format, WriteFormat::Exr(_)))
-}
-
-fn finite(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(v) if v.is_finite() => Ok(v),
-        Ok(_) => Err("the number must be finite".to_owned()),
-        Err(_) => Err("not a number".to_owned()),
-    }
-}
-
-fn stops(text: &str) -> Result<f64, String> {
-    match finite(text)? {
-        v if v.abs() <= MAX_STOPS => Ok(v),
-        _ => Err(format!("more than {MAX_STOPS} stops either way is beyond the range of floats")),
-    }
 }

@@ -5,32 +5,39 @@ mod cpu;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod measure;
+mod subject;
 mod table;
 
-use std::time::Duration;
-
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use veni_light::sphere::Equirect;
 
 use crate::args::ModelArgs;
-use crate::report::{self, Outcome, Report, is_closed_pipe};
+use crate::features::{GPU, only};
+use crate::report::{self, Outcome, Report};
 use crate::size::Size;
 use cases::Case;
 use measure::Stopwatch;
+use subject::Subject;
 use table::{Row, Table};
 
-/// Measure how fast this machine bakes, on the CPU and on every graphics device
+#[cfg_attr(
+    feature = "gpu",
+    doc = "Measure how fast this machine bakes, on the CPU and on every graphics device"
+)]
+#[cfg_attr(not(feature = "gpu"), doc = "Measure how fast this machine bakes")]
 #[derive(Args, Debug)]
 #[command(
-    long_about = "Measure how fast this machine bakes, on the CPU and on every graphics device.\n\n\
+    long_about = format!("Measure how fast this machine bakes{}.\n\n\
         Each line is one device, model and size: the time of one panorama in milliseconds (the best of several, \
         within about a second), millions of directions per second, GFLOP/s (10^9 floating-point operations per \
         second), and the share of the rate of f32 multiply-adds (FMA) that the same device was measured to do at \
         most. Only the decoder's own multiply-adds count, two operations each.\n\n\
-        Only decoding is timed: no files, and on graphics devices no transfer of the pixels back. Close other \
-        programs first. A size that would take longer than ten seconds is skipped, which software devices make \
-        likely.",
+        Only decoding is timed: no files{}. Close other programs first. A size that would take longer than ten \
+        seconds is skipped{}.",
+        only(GPU, ", on the CPU and on every graphics device"),
+        only(GPU, ", and on graphics devices no transfer of the pixels back"),
+        only(GPU, ", which software devices make likely")),
     after_help = "Examples:\n  \
         veni-cli bench\n  \
         veni-cli bench --sizes 1024x512 --latent-vectors 9,49,100\n  \
@@ -54,24 +61,6 @@ pub(crate) struct Bench {
     all: bool,
 }
 
-/// Something that bakes.
-trait Subject {
-    /// What to call it in results.
-    fn name(&self) -> &str;
-
-    /// Its own rate of f32 multiply-adds, floating-point operations per second.
-    fn multiply_add_rate(&mut self) -> Result<f64>;
-
-    /// Readies a latent of a model.
-    fn load(&mut self, case: &Case) -> Result<Box<dyn Bakes>>;
-}
-
-/// A latent, ready to be baked.
-trait Bakes {
-    /// Bakes a panorama: how long that took, preparations for this size not included.
-    fn bake(&mut self, grid: Equirect) -> Result<Duration>;
-}
-
 impl Bench {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
         let mut grids = Vec::new();
@@ -86,16 +75,11 @@ impl Bench {
         let mut subjects = subjects(report);
         let table = Table::new(subjects.iter().map(|s| s.name()), &cases);
         table.head(report)?;
-        let mut failed = Vec::new();
-        for subject in &mut subjects {
-            match self.measure(subject.as_mut(), &cases, &grids, &table, report) {
-                Ok(()) => {}
-                Err(error) if is_closed_pipe(&error) => return Err(error),
-                // one device must not hide the others
-                Err(error) => failed.push(error.context(subject.name().to_owned())),
-            }
-        }
-        report::last_of(failed)
+        // one device must not hide the others
+        report::each(&mut subjects, |subject| {
+            let measured = self.measure(subject.as_mut(), &cases, &grids, &table, report);
+            measured.with_context(|| subject.name().to_owned())
+        })
     }
 
     fn measure(

@@ -1,11 +1,10 @@
 //! `veni-cli completions`: tab completion for a shell.
 
 use anyhow::Result;
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::{Shell, generate};
 use serde_json::json;
 
-use crate::args::Cli;
 use crate::report::{Outcome, Report, to_stdout};
 
 /// Print tab completions for a shell
@@ -21,9 +20,10 @@ pub(crate) struct Completions {
 }
 
 impl Completions {
-    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+    /// For the command line `cli`.
+    pub(crate) fn run(self, mut cli: Command, report: Report) -> Result<Outcome> {
         let mut script = Vec::new();
-        generate(self.shell, &mut Cli::command(), "veni-cli", &mut script);
+        generate(self.shell, &mut cli, "veni-cli", &mut script);
         if report.is_json() {
             let script = String::from_utf8_lossy(&script);
             report.result("", &json!({ "shell": self.shell.to_string(), "script": script }))?;

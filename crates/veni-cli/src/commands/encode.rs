@@ -2,30 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::Args;
 use serde_json::json;
-use veni_data::Item;
-use veni_image::metrics::{Alignment, Scores, scores};
-use veni_light::field::Field;
-use veni_light::latent::Latent;
 use veni_light::output::Overwrite;
 use veni_image::Panorama;
 use veni_image::tonemap::Tonemap;
 use veni_light::sphere::Equirect;
-use veni_core::train::config::DeviceKind;
-use veni_core::vae::Veni;
 
 use crate::args::{Force, ModelArgs};
+use crate::latent_files::LatentFiles;
 use crate::output::{self, with_remedy};
-use crate::progress::Progress;
+use crate::progress::Bars;
 use crate::report::{self, Outcome, Report, to_stdout};
 use crate::shard::Shard;
 use crate::sheet::Sheet;
-use crate::source::{self, Loaded};
+use crate::source::{self, Encoded, Encoding};
 
-/// The resolution at which a panorama is encoded and scored: that of the training data of the article.
-const GRID: [usize; 2] = [128, 64];
 /// The resolution of a preview.
 const PREVIEW: [usize; 2] = [256, 128];
 
@@ -49,13 +42,8 @@ pub(crate) struct Encode {
     #[arg(required = true, value_name = "PANORAMA")]
     panoramas: Vec<PathBuf>,
 
-    /// Latent file to write, for a single panorama
-    #[arg(long, short, value_name = "OUT.json", conflicts_with = "out_dir")]
-    output: Option<PathBuf>,
-
-    /// Folder for the latents, created if missing; each is named after its panorama
-    #[arg(long, value_name = "DIR")]
-    out_dir: Option<PathBuf>,
+    #[command(flatten)]
+    target: LatentFiles,
 
     /// Also write a PNG: panorama | reconstruction, one pair per row
     #[arg(long, value_name = "OUT.png")]
@@ -71,59 +59,6 @@ pub(crate) struct Encode {
     shard: Shard,
 }
 
-/// A panorama's latent and how good it is.
-pub(crate) struct Encoded {
-    pub(crate) latent: Latent,
-    pub(crate) scores: Scores,
-    panorama: Panorama,
-    field: Field,
-}
-
-/// A model's encoder, ready.
-pub(crate) struct Encoding<'a> {
-    loaded: &'a Loaded,
-    veni: Veni,
-}
-
-impl<'a> Encoding<'a> {
-    pub(crate) fn new(loaded: &'a Loaded) -> Result<Self> {
-        if !loaded.model.has_encoder() {
-            bail!(
-                "{}: this model has no encoder, it decodes only; name one that has with --model FILE",
-                loaded.name
-            );
-        }
-        let veni = Veni::from_model(&loaded.model, &DeviceKind::Flex.device()?)
-            .map_err(|e| e.in_file(&loaded.name))?;
-        Ok(Self { loaded, veni })
-    }
-
-    /// Reads, encodes, and decodes again to compare.
-    pub(crate) fn encode_file(&self, path: &Path, report: Report) -> Result<Encoded> {
-        let panorama = source::panorama(path, report)?;
-        let grid = Equirect::new(GRID[0], GRID[1]);
-        let item = Item::new(path, &panorama, grid);
-        let encoded =
-            self.veni.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
-        let vectors = encoded.into_iter().next().map(|e| e.vectors).unwrap_or_default();
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
-        let latent = Latent {
-            vectors,
-            log_exposure: item.log_exposure,
-            model: Some(self.loaded.model.hash()),
-            source: Some(name.unwrap_or_else(|| path.display().to_string())),
-        };
-        let decoder = self.loaded.model.decoder().map_err(|e| e.in_file(&self.loaded.name))?;
-        let field = decoder.condition(&latent).map_err(|e| e.in_file(path))?;
-        let mut decoded = vec![[0.0; 3]; grid.len()];
-        field.log_radiance_batch(&grid.directions(), &mut decoded);
-        let prediction: Vec<f32> = decoded.as_flattened().iter().map(|v| v - item.log_exposure).collect();
-        // the article's protocol, as in training
-        let scores = scores(&prediction, &item.log_radiance, grid.height, grid.width, Alignment::LogFactor);
-        Ok(Encoded { latent, scores, panorama, field })
-    }
-}
-
 impl Encode {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
         let overwrite = Overwrite::from(self.force);
@@ -134,9 +69,10 @@ impl Encode {
             self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
         self.shard.note_idle(self.panoramas.len(), report);
         let own: Vec<_> = self.panoramas.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)).collect();
-        let mut progress = Progress::start(report, "panorama", 0, own.len() as u64);
+        let bars = Bars::new(report);
+        bars.begin("", "panorama", Some(own.len() as u64));
         let mut failed = Vec::new();
-        for (done, (at, path)) in (1..).zip(own) {
+        for (at, path) in own {
             let encode = || -> Result<Encoded> {
                 let encoded = encoding.encode_file(path, report)?;
                 if let Some(output) = outputs.get(at) {
@@ -153,9 +89,9 @@ impl Encode {
                 }
                 Err(error) => failed.push(error),
             }
-            progress.set(done, String::new);
+            bars.add(1);
         }
-        progress.finish();
+        bars.end();
         if let Some((sheet, path)) = sheet.zip(self.preview.as_ref())
             && failed.len() < self.panoramas.len()
         {
@@ -170,8 +106,7 @@ impl Encode {
         if let Some(preview) = &self.preview {
             output::check(std::slice::from_ref(preview), &["png"], overwrite)?;
         }
-        let (output, folder) = (self.output.as_ref(), self.out_dir.as_ref());
-        output::one_per_input(&self.panoramas, output, folder, "json", overwrite, self.shard)
+        self.target.of(&self.panoramas, overwrite, self.shard)
     }
 }
 

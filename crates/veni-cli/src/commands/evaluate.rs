@@ -1,7 +1,6 @@
 //! `veni-cli evaluate`: the experiments of the paper on models and panoramas of one's own.
 
 mod inputs;
-mod watch;
 
 use std::path::PathBuf;
 
@@ -22,12 +21,13 @@ use veni_light::output::{Overwrite, write_atomic};
 use veni_light::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
 
-use crate::loading::Loading;
 use crate::output::with_remedy;
+use crate::part::fold;
+use crate::progress::Bars;
 use crate::report::{Outcome, Report, to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
-use watch::Bars;
+use inputs::BaselineName;
 
 /// The fewest rows on which structural similarity is defined.
 const MIN_HEIGHT: usize = 8;
@@ -94,7 +94,7 @@ pub(crate) struct Evaluate {
 
     /// Cross-validation: the I-th of N parts of the panoramas (of train/, where there is one), which 'veni-cli train
     /// --fold I/N' held back
-    #[arg(long, value_name = "I/N")]
+    #[arg(long, value_name = "I/N", value_parser = fold)]
     fold: Option<Fold>,
 
     /// Only the first so many panoramas by name
@@ -145,19 +145,6 @@ pub(crate) enum Protocol {
     Paper,
 }
 
-/// Classical bases.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum BaselineName {
-    /// No baseline
-    None,
-    /// Spherical harmonics of log radiance, weighted least squares
-    Sh,
-    /// Spherical Gaussians of either sign in log radiance
-    Sg,
-    /// A mixture of positive spherical Gaussians in radiance
-    Mixture,
-}
-
 /// How tables are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TableFormat {
@@ -198,12 +185,12 @@ impl Evaluate {
         let subjects = inputs::subjects(&self.models, device)?;
         let lpips =
             if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
-        let loading = Loading::new(report);
-        let data = Dataset::load_heard(&files, grid, &|done, all| loading.set(done, all));
-        loading.finish();
-        let data = data?;
+        let bars = Bars::new(report);
+        let data = Dataset::load_heard(&files, grid, &|done, all| bars.loading(done, all));
+        bars.end();
+        let data = data.map_err(with_remedy)?;
         inputs::create_folder(&self.out)?;
-        let (store, figures, bars) = (Store::new(&self.out), self.out.join("figures"), Bars::new(report));
+        let (store, figures) = (Store::new(&self.out), self.out.join("figures"));
         let settings =
             Settings { seed: self.seed, quick: self.quick, pairs: self.pairs, frames: self.frames };
         let bases = inputs::bases(&self.baselines, &subjects)?;
@@ -221,7 +208,7 @@ impl Evaluate {
         if self.shard.is_part() {
             let (at, of) = self.shard.place();
             let kept = self.protocol.keep(&evaluation, Share { at, of }).map_err(with_remedy);
-            bars.finish();
+            bars.end();
             kept?;
             let (out, shard) = (self.out.display(), self.shard);
             let human =
@@ -230,7 +217,7 @@ impl Evaluate {
             return Ok(Outcome::Fine);
         }
         let found = self.protocol.run(&evaluation, &published).map_err(with_remedy);
-        bars.finish();
+        bars.end();
         self.show(&found?, report)?;
         Ok(Outcome::Fine)
     }

@@ -20,8 +20,9 @@ use veni_light::sphere::Equirect;
 use veni_core::train::config::DeviceKind;
 
 use crate::args::{Force, ModelArgs};
+use crate::latent_files::{LatentFiles, source_of};
 use crate::output::{self, with_remedy};
-use crate::progress::Progress;
+use crate::progress::Bars;
 use crate::report::{self, Outcome, Report, to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
@@ -57,13 +58,8 @@ pub(crate) struct Fit {
     #[command(flatten)]
     input: Input,
 
-    /// Latent file to write, for a single picture
-    #[arg(long, short, value_name = "OUT.json", conflicts_with = "out_dir")]
-    output: Option<PathBuf>,
-
-    /// Folder for the latents, created if missing; each is named after its picture
-    #[arg(long, value_name = "DIR")]
-    out_dir: Option<PathBuf>,
+    #[command(flatten)]
+    target: LatentFiles,
 
     /// Also write the whole panorama: what is known as it is, the rest from the latent (.exr, .hdr, .png; one
     /// picture)
@@ -110,8 +106,7 @@ impl Fit {
         let overwrite = Overwrite::from(self.force);
         let pictures = &self.input.pictures;
         self.check_images(overwrite)?;
-        let (output, folder) = (self.output.as_ref(), self.out_dir.as_ref());
-        let outputs = output::one_per_input(pictures, output, folder, "json", overwrite, self.shard)?;
+        let outputs = self.target.of(pictures, overwrite, self.shard)?;
         self.shard.note_idle(pictures.len(), report);
         self.settings.grid(false)?;
         let config = self.settings.config(self.shaded.normals.is_some())?;
@@ -119,15 +114,9 @@ impl Fit {
         let device = DeviceKind::Flex.device()?;
         let subject =
             LoadedModel::new(&loaded.name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?;
-        let mut failed = Vec::new();
-        for (at, path) in pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)) {
-            match self.one(path, outputs.get(at), &subject, &config, report) {
-                Ok(()) => {}
-                Err(error) if report::is_closed_pipe(&error) => return Err(error),
-                Err(error) => failed.push(error),
-            }
-        }
-        report::last_of(failed)
+        report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
+            self.one(path, outputs.get(at), &subject, &config, report)
+        })
     }
 
     /// Refuses what could not be written after the fits.
@@ -173,8 +162,7 @@ impl Fit {
                 self.fit(path, observation, subject, config, report)?
             }
         };
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
-        fitted.best.latent.source = Some(name.unwrap_or_else(|| path.display().to_string()));
+        fitted.best.latent.source = Some(source_of(path));
         fitted.best.latent.model = Some(subject.model().hash());
         if let Some(output) = output {
             fitted.best.latent.save(output, overwrite).map_err(with_remedy)?;
@@ -211,14 +199,15 @@ impl Fit {
         let vectors = subject.latent_vectors();
         let config = self.settings.adapted(*config, partial, vectors);
         let (total, prior) = (config.most_updates(vectors) * starts.len() as u64, subject.prior());
-        let mut progress = Progress::start(report, "step", 0, total);
+        let bars = Bars::new(report);
+        bars.begin("", "step", Some(total));
         let best = observation.with_target(|target| {
             let target = FitTarget { prior: Some(&prior), ..target.clone() };
             best_of(subject.fit_decoder(), &target, &starts, &config, &mut |step, loss| {
-                progress.set(step, || format!("loss {loss:.4}"));
+                bars.advance(step, &format!("loss {loss:.4}"));
             })
         });
-        progress.finish();
+        bars.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         let scores = match (partial, observation.clipped.is_some()) {
             (false, false) => Some(score(subject, &best.latent, &observation)?),
@@ -262,10 +251,11 @@ impl Fit {
         self.check_starts(starts.len())?;
         self.shaded.exposed(&image, picture, subject, &mut starts)?;
         let prior = subject.prior();
-        let mut progress = Progress::start(report, "step", 0, config.steps * starts.len() as u64);
-        let mut watch = |step, loss| progress.set(step, || format!("loss {loss:.4}"));
+        let bars = Bars::new(report);
+        bars.begin("", "step", Some(config.steps * starts.len() as u64));
+        let mut watch = |step, loss| bars.advance(step, &format!("loss {loss:.4}"));
         let best = best_light(subject.fit_decoder(), &image, Some(&prior), &starts, &config, &mut watch);
-        progress.finish();
+        bars.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         for latent in best.all.iter_mut().chain([&mut best.latent]) {
             latent.log_exposure = self.shaded.recorded(latent.log_exposure);

@@ -4,13 +4,14 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_mangen::Man as Page;
 use serde_json::json;
 use veni_light::Error;
-use veni_light::output::{Overwrite, refuse_existing, write_atomic};
+use veni_light::output::{Overwrite, write_atomic};
 
-use crate::args::{Cli, Force};
+use crate::args::Force;
+use crate::output::{refuse_existing, with_remedy};
 use crate::report::{Outcome, Report, to_stdout};
 
 /// Print the manual page, or write one per command into a folder
@@ -28,8 +29,9 @@ pub(crate) struct Man {
 }
 
 impl Man {
-    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
-        let mut cli = Cli::command().disable_help_subcommand(true);
+    /// For the command line `cli`.
+    pub(crate) fn run(self, cli: Command, report: Report) -> Result<Outcome> {
+        let mut cli = cli.disable_help_subcommand(true);
         cli.build();
         let Some(folder) = self.folder else {
             let text = render(cli)?;
@@ -58,7 +60,8 @@ impl Man {
             let text = render(command)?;
             write_atomic(&path, overwrite, |out| {
                 out.write_all(&text).map_err(|e| Error::io(&path, "write", e))
-            })?;
+            })
+            .map_err(with_remedy)?;
             files.push(path.display().to_string());
         }
         let human = format!("{} pages in {}", files.len(), folder.display());
@@ -67,7 +70,7 @@ impl Man {
     }
 }
 
-fn render(command: clap::Command) -> Result<Vec<u8>> {
+fn render(command: Command) -> Result<Vec<u8>> {
     let mut text = Vec::new();
     Page::new(command).render(&mut text)?;
     Ok(text)

@@ -2,6 +2,7 @@
 
 mod contact;
 mod expand;
+mod network;
 mod place;
 mod record;
 mod report;
@@ -18,6 +19,7 @@ use veni_data::prepare::{PrepareConfig, Shares};
 use veni_light::sphere::Equirect;
 
 use crate::args::Force;
+use crate::features::{LEARN, only};
 use crate::report::{Outcome, Report};
 use crate::shard::Shard;
 use crate::size::Size;
@@ -48,12 +50,13 @@ use store::{Settings, Store};
         it gives NaN, infinity or negative radiance are refused.\n\n\
         Stopped half-way, the same command goes on where it was; run again, it takes in only what is new or changed. \
         --force begins anew and removes what an earlier run wrote into DIR, nothing else.",
-    after_help = "Exit code 1: ready, but some files were refused.\n\n\
+    after_help = format!("Exit code 1: ready, but some files were refused.\n\n\
         Examples:\n  \
-        veni-cli prepare panoramas/ -o data && veni-cli train --data data --out run\n  \
+        veni-cli prepare panoramas/ -o data{}\n  \
         veni-cli prepare hdris/ streets/ -o data --size 256x128 --val 0.1 --test 0.1\n  \
         veni-cli prepare hdris/ -o data --expand off          no LDR images\n  \
-        veni-cli prepare ldr/ -o data --expand-with hdrcnn.onnx --expand-output log"
+        veni-cli prepare ldr/ -o data --expand-with hdrcnn.onnx --expand-output log",
+        only(LEARN, " && veni-cli train --data data --out run"))
 )]
 pub(crate) struct Prepare {
     /// Folders and image files

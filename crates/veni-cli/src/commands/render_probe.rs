@@ -17,18 +17,16 @@ use veni_fit::shade::{Camera, Colour, Lights, Material, ShadingForm, Surface, Tr
 use veni_light::sphere::Equirect;
 
 use crate::args::{Force, ModelArgs};
+use crate::features::{LEARN, only};
+use crate::numbers::{albedo, elevation, finite, fraction, lights, shininess};
 use crate::output::{self, CAMERA, MATERIAL, with_remedy};
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
-use crate::skies::{self, Job, Many, Sky, Target};
+use crate::skies::{self, Change, Job, Many, Sky, Target};
 use shape::Up;
 
 /// Largest image, pixels, for which about 150 bytes each are needed.
 const MAX_PIXELS: usize = 1 << 24;
-/// Largest width of the light.
-const MAX_LIGHTS: usize = 4096;
-/// Largest |--exposure|.
-const MAX_STOPS: f64 = 64.0;
 /// A mask: 0 and 1, as they are.
 const PLAIN: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
 
@@ -36,12 +34,12 @@ const PLAIN: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
 #[derive(Args, Debug)]
 #[command(
     group = ArgGroup::new("light").required(true),
-    long_about = "Render a sphere or a mesh lit by a panorama or a latent.\n\n\
+    long_about = format!("Render a sphere or a mesh lit by a panorama or a latent.\n\n\
         The light is an HDR panorama (as it is, not through the encoder), a latent file, or a random sky named by \
         --seed. The surface is Lambertian, or Blinn-Phong with --ks. Radiance is physically right: the sum over the \
         light's pixels of reflectance x radiance x cosine x solid angle. Every pixel sees the whole sky: there are no \
-        shadows and no interreflections, as in the article.\n\n\
-        With --normals and --mask this makes the inputs from which 'veni-cli fit' recovers the light.",
+        shadows and no interreflections, as in the article.{}",
+        only(LEARN, "\n\nWith --normals and --mask this makes the inputs from which 'veni-cli fit' recovers the light.")),
     after_help = "World: z up; the middle of a panorama lies at +x, its right at -y. The camera looks along --azimuth, which \
         turns from +x to +y, and is raised by --elevation; it frames the sphere or mesh whole. Normals are unit vectors \
         of this world, x y z in R G B, 0 where there is no surface; the attribute veni:camera of both EXR files holds \
@@ -99,15 +97,8 @@ pub(crate) struct RenderProbe {
     #[arg(long, value_name = "S", default_value = "500", value_parser = shininess)]
     shininess: f32,
 
-    /// Turn the light about the vertical axis, counter-clockwise seen from above
-    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = finite, allow_hyphen_values = true,
-        hide_default_value = true)]
-    turn: f64,
-
-    /// Make the light brighter (or, negative, darker) by factors of two
-    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = stops, allow_hyphen_values = true,
-        hide_default_value = true)]
-    exposure: f64,
+    #[command(flatten)]
+    change: Change,
 
     /// Azimuth along which the camera looks
     #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = finite, allow_hyphen_values = true,
@@ -146,26 +137,18 @@ impl RenderProbe {
         let grid = Equirect::new(self.lights, self.lights / 2);
         let transfer = self.transfer(&surface, grid)?;
         let scene = Scene { surface, camera, grid, transfer };
-        let mut failed = Vec::new();
-        for (at, job) in jobs.iter().enumerate() {
-            match self.one(job, &scene, at == 0, report) {
-                Ok(()) => {}
-                Err(error) if report::is_closed_pipe(&error) => return Err(error),
-                Err(error) => failed.push(error),
-            }
-        }
-        report::last_of(failed)
+        report::each(jobs.iter().enumerate(), |(at, job)| self.one(job, &scene, at == 0, report))
     }
 
     /// One light; with the `first` also what is the same under all of them.
     fn one(&self, job: &Job, scene: &Scene, first: bool, report: Report) -> Result<()> {
         let started = Instant::now();
-        let (turn, grid) = (self.turn.to_radians(), scene.grid);
+        let (turn, grid) = (self.change.turn.to_radians(), scene.grid);
         let light = match &job.sky {
             Sky::File(path) => light::from_file(path, &self.model, grid, turn, report)?,
             Sky::Seed(seed) => light::seeded(*seed, &self.model, grid, turn)?,
         };
-        let factor = self.exposure.exp2() as f32;
+        let factor = self.change.exposure.exp2() as f32;
         let radiance: Vec<_> = light.iter().map(|p| p.map(|v| v * factor)).collect();
         let image = scene.transfer.render(&radiance);
         let mut files = self.write(&job.files, scene, image, factor)?;
@@ -295,68 +278,4 @@ fn preview(surface: &Surface, image: &[[f32; 3]], factor: f32) -> Tonemap {
         image.iter().zip(surface.valid()).filter(|(_, valid)| **valid).flat_map(|(p, _)| *p).collect();
     let white = (quantile(&seen, REFERENCE_QUANTILE) / factor).max(f32::MIN_POSITIVE);
     Tonemap { scale: 1.0 / white, curve: Curve::Srgb }
-}
-
-fn finite(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(v) if v.is_finite() => Ok(v),
-        Ok(_) => Err("the number must be finite".to_owned()),
-        Err(_) => Err("not a number".to_owned()),
-    }
-}
-
-fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
-    match finite(text)? {
-        v if (low..=high).contains(&v) => Ok(v),
-        v => Err(format!("{v} is not between {low} and {high}")),
-    }
-}
-
-pub(crate) fn fraction(text: &str) -> Result<f32, String> {
-    Ok(within(text, 0.0, 1.0)? as f32)
-}
-
-pub(crate) fn shininess(text: &str) -> Result<f32, String> {
-    Ok(within(text, 0.0, 1e6)? as f32)
-}
-
-fn stops(text: &str) -> Result<f64, String> {
-    within(text, -MAX_STOPS, MAX_STOPS)
-}
-
-fn elevation(text: &str) -> Result<f64, String> {
-    within(text, -90.0, 90.0)
-}
-
-pub(crate) fn albedo(text: &str) -> Result<[f32; 3], String> {
-    let values = text.split(',').map(fraction).collect::<Result<Vec<_>, _>>()?;
-    match values[..] {
-        [grey] => Ok([grey; 3]),
-        [r, g, b] => Ok([r, g, b]),
-        _ => Err(format!("{} numbers: give one, or three separated by commas", values.len())),
-    }
-}
-
-pub(crate) fn lights(text: &str) -> Result<usize, String> {
-    match text.trim().parse::<usize>() {
-        Ok(n) if (2..=MAX_LIGHTS).contains(&n) && n % 2 == 0 => Ok(n),
-        _ => Err(format!("give an even width from 2 to {MAX_LIGHTS}; the height is half of it")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_read_and_refused() {
-        assert_eq!(albedo("0.5"), Ok([0.5; 3]));
-        assert_eq!(albedo("1, 0.5,0"), Ok([1.0, 0.5, 0.0]));
-        assert!(albedo("1,2,3").unwrap_err().contains("between 0 and 1"));
-        assert!(albedo("1,1").unwrap_err().contains("three"));
-        assert!(albedo("").is_err() && fraction("NaN").is_err() && shininess("-1").is_err());
-        assert_eq!(lights("64"), Ok(64));
-        assert!(lights("7").is_err() && lights("0").is_err() && lights("99999").is_err());
-        assert!(elevation("91").is_err());
-    }
 }

@@ -7,15 +7,15 @@ use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
 use veni_light::Error;
-use veni_light::output::{Overwrite, refuse_existing};
+use veni_light::output::Overwrite;
 use veni_image::Panorama;
 use veni_image::tonemap::Tonemap;
 use veni_light::sphere::Equirect;
 
-use crate::args::{DecodeDevice, Force, ModelArgs};
+use crate::args::{Decoding, Force};
 use crate::device::Device;
 use crate::output::{self, with_remedy};
-use crate::progress::Progress;
+use crate::progress::Bars;
 use crate::report::{Outcome, Report};
 use crate::sheet::Sheet;
 use crate::size::Size;
@@ -63,11 +63,7 @@ pub(crate) struct Sample {
     latents: Option<PathBuf>,
 
     #[command(flatten)]
-    model: ModelArgs,
-
-    /// What decodes
-    #[arg(long, value_enum, default_value_t)]
-    device: DecodeDevice,
+    decoding: Decoding,
 
     #[command(flatten)]
     force: Force,
@@ -117,12 +113,13 @@ impl Sample {
             bail!("--seed {}: leaves no room for {count} seeds; give a smaller one", self.seed);
         };
         let files = self.latent_files(last, overwrite)?;
-        let Loaded { model, name } = source::model(&self.model)?;
+        let Loaded { model, name } = source::model(&self.decoding.model)?;
         model.config().decoder.check_folds().map_err(|e| e.in_file(&name))?;
-        let device = Device::open(self.device, &model, report)?;
+        let device = Device::open(self.decoding.device, &model, report)?;
         let cell = Equirect::new(width, height);
         let mut sheet = Sheet::new(grid.columns, grid.rows, width, height);
-        let mut progress = Progress::start(report, "sky", 0, count as u64);
+        let bars = Bars::new(report);
+        bars.begin("", "sky", Some(count as u64));
         for (at, seed) in (self.seed..=last).enumerate() {
             let latent = source::seeded(&model, seed);
             if let Some(file) = files.get(at) {
@@ -135,9 +132,9 @@ impl Sample {
                 at / grid.columns,
                 sky.pixels().iter().map(|p| tonemap.apply_u8(*p)),
             );
-            progress.set(at as u64 + 1, String::new);
+            bars.add(1);
         }
-        progress.finish();
+        bars.end();
         sheet.write(&self.output, overwrite).map_err(with_remedy)?;
         let Grid { columns, rows } = grid;
         let human = format!(
@@ -177,7 +174,7 @@ impl Sample {
         let Some(folder) = &self.latents else { return Ok(Vec::new()) };
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         let files: Vec<_> = (self.seed..=last).map(|seed| folder.join(format!("sky-{seed}.json"))).collect();
-        files.iter().try_for_each(|f| refuse_existing(f, overwrite))?;
+        files.iter().try_for_each(|f| output::refuse_existing(f, overwrite))?;
         Ok(files)
     }
 }

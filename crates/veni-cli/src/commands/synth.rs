@@ -17,8 +17,9 @@ use veni_light::sphere::Equirect;
 use veni_synth::{Fixed, Place, Scene, SkyKind, generate};
 
 use crate::args::Force;
+use crate::features::{LEARN, only};
 use crate::output::{self, with_remedy};
-use crate::progress::{Progress, duration};
+use crate::progress::{Bars, duration};
 use crate::report::{Outcome, Report};
 use crate::shard::Shard;
 use crate::sheet::Sheet;
@@ -47,13 +48,13 @@ const MAX_PIXELS: usize = 1 << 28;
         is multiplied by a power of two that its attribute veni:radianceScale records (this program divides by it \
         again); the attribute veni:scene holds all parameters of the scene as JSON. Image k of seed S is the same to the \
         bit whatever the count, the machine's number of cores, or what else is generated.",
-    after_help = "Examples:\n  \
+    after_help = format!("Examples:\n  \
         veni-cli synth --sheet sheet.png --count 64              only look\n  \
         veni-cli synth -o skies --count 10000                    a training set, 128 x 64 each\n  \
         veni-cli synth -o skies --count 10000 --resume           go on after an interruption\n  \
         veni-cli synth -o dusk --count 20 --scene sunset --place street --size 1024\n  \
-        veni-cli synth -o noon --scene clear --sun-elevation 60 --sun-azimuth 0 --turbidity 2.5 --cloud-cover 0\n  \
-        veni-cli train --data hdri --synthetic 10000 --out run   generated while training starts, without files"
+        veni-cli synth -o noon --scene clear --sun-elevation 60 --sun-azimuth 0 --turbidity 2.5 --cloud-cover 0{}",
+        only(LEARN, "\n  veni-cli train --data hdri --synthetic 10000 --out run   generated while training starts, without files"))
 )]
 pub(crate) struct Synth {
     /// Folder for the panoramas, created if missing
@@ -155,11 +156,12 @@ impl Synth {
         };
         let cells = if sheet.is_some() { self.count.min(MAX_CELLS) } else { 0 };
         let kept = Mutex::new(0u64);
-        let shared = Mutex::new((sheet, Progress::start(report, "sky", 0, count as u64), 0u64));
+        let bars = Bars::new(report);
+        bars.begin("", "sky", Some(count as u64));
+        let shared = Mutex::new(sheet);
         let finished = |index: u64, panorama: Option<&Panorama>| -> Result<()> {
-            let mut shared = shared.lock().map_err(|_| anyhow!("a thread was lost"))?;
-            let (sheet, progress, done) = &mut *shared;
-            if let (Some(sheet), Some(panorama)) = (sheet, panorama)
+            let mut sheet = shared.lock().map_err(|_| anyhow!("a thread was lost"))?;
+            if let (Some(sheet), Some(panorama)) = (sheet.as_mut(), panorama)
                 && index < cells
             {
                 let at = index as usize;
@@ -167,8 +169,7 @@ impl Synth {
                 let pixels = panorama.pixels().iter().map(|p| tonemap.apply_u8(*p));
                 sheet.place(at % COLUMNS, at / COLUMNS, pixels);
             }
-            *done += 1;
-            progress.set(*done, String::new);
+            bars.add(1);
             Ok(())
         };
         // a file that is there already only counts; the sheet needs its picture all the same
@@ -206,8 +207,8 @@ impl Synth {
             return Err(error);
         }
         let kept = kept.into_inner().map_err(|_| anyhow!("a thread was lost"))?;
-        let (sheet, progress, _) = shared.into_inner().map_err(|_| anyhow!("a thread was lost"))?;
-        progress.finish();
+        let sheet = shared.into_inner().map_err(|_| anyhow!("a thread was lost"))?;
+        bars.end();
         if let (Some(sheet), Some(path)) = (sheet, &self.sheet) {
             sheet.write(path, overwrite).map_err(with_remedy)?;
         }

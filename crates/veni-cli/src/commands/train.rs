@@ -1,209 +1,32 @@
 //! `veni-cli train`: a model from a folder of panoramas.
 
+mod args;
+mod command_line;
 mod config;
 mod folder;
+mod holding;
 mod resume;
-mod watch;
 
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
-use clap::{Args, ValueEnum};
+use anyhow::{Context, Result, anyhow, bail};
 use serde_json::json;
-use veni_data::Fold;
+use veni_light::Error;
 use veni_light::model::ModelKind;
-use veni_core::train::config::{DeviceKind, Devices, TrainConfig};
+use veni_core::train::config::TrainConfig;
 use veni_core::train::init::Initialised;
-use veni_core::train::presets::Preset;
 use veni_core::train::run::{Finish, Trainer};
 
 use crate::commands::inspect::run::{self, Best};
-use crate::loading::Loading;
 use crate::output::with_remedy;
-use crate::progress::duration;
+use crate::progress::{Bars, duration};
 use crate::report::{Outcome, Report, to_stderr};
-use watch::Watch;
+use args::TrainDevice;
+use command_line::shell_word;
 
-/// Train a model on HDR panoramas
-#[derive(Args, Debug)]
-#[command(
-    long_about = "Train a model on HDR panoramas.\n\n\
-        DIR holds equirectangular OpenEXR or Radiance files. If it has the folders train/ and val/, they are used \
-        as such; otherwise a tenth of the files, chosen by seed, validates. RUN receives config.toml (everything \
-        that defines the run), metrics.jsonl (one line per step and validation), preview/*.png (target | \
-        reconstruction | random sample), checkpoint/ and model.safetensors, the weights that validated best; with \
-        --system reni++ also latents.safetensors, the latents of the training panoramas.\n\n\
-        --pretrain makes a run of two stages; config.toml may describe others ([[stage]], see docs/MODEL.md): each has \
-        updates, panoramas, learning rates, losses and augmentation of its own, and all are validated on the \
-        panoramas of --data.\n\n\
-        More panoramas than --set data.memory_mib=4096 holds are kept in a file without a name beside RUN, or in the \
-        folder of --set data.scratch=DIR, and read from there; both may be given anew with --resume.\n\n\
-        Ctrl-C writes a checkpoint and ends; a second one ends at once. A run that was stopped or killed continues \
-        with --resume from its last checkpoint as if nothing had happened, to the bit on the same machine.",
-    after_help = "Examples:\n  \
-        veni-cli train --data assets/panoramas --preset tiny --out runs/try\n  \
-        veni-cli train --data hdri --preset small --latent-vectors 9 --seed 1 --out runs/small\n  \
-        veni-cli train --data hdri --system reni++ --preset small --out runs/reni\n  \
-        veni-cli train --resume --out runs/small\n  \
-        veni-cli train --data hdri --pretrain skies ldr --pretrain-steps 20000 --out runs/two\n  \
-        veni-cli train --data hdri --pretrain-synthetic 5000 --out runs/three\n  \
-        veni-cli train --data indoor --init runs/small --steps 3000 --out runs/indoor\n  \
-        veni-cli train --data hdri --synthetic 10000 --out runs/more   beside 10,000 generated scenes\n  \
-        veni-cli train --data hdri --preset paper --device cuda --devices 0,1,2,3 --set batch=16 --out runs/cards\n  \
-        veni-cli train --data hdri --out runs/kld --set loss.kld=0.001 --set batch=8\n  \
-        veni-cli train --config runs/small/config.toml --seed 2 --out runs/second"
-)]
-pub(crate) struct Train {
-    /// Folders of panoramas (or files)
-    #[arg(long, value_name = "DIR", num_args = 1..,
-        required_unless_present_any = ["resume", "config", "synthetic"])]
-    data: Vec<PathBuf>,
-
-    /// Also train on N generated scenes, as 'veni-cli synth' makes them, drawn with the run's seed; how often one is
-    /// drawn follows from the numbers, or is set by --set data.synthetic_share=0.5
-    #[arg(long, value_name = "N")]
-    synthetic: Option<usize>,
-
-    /// Cross-validation: hold back the I-th of N parts of the panoramas, and validate by it instead of by val/;
-    /// 'veni-cli evaluate --fold I/N' reports on it
-    #[arg(long, value_name = "I/N")]
-    fold: Option<Fold>,
-
-    /// Folder of the run
-    #[arg(long, short, value_name = "RUN")]
-    out: PathBuf,
-
-    /// Begin with the weights of this model (or run) instead of random ones; a model without encoder, or --system
-    /// reni++, takes the decoder alone
-    #[arg(long, value_name = "MODEL")]
-    init: Option<PathBuf>,
-
-    /// Train on other panoramas first (synthetic skies, expanded photographs), then on those of --data with a tenth of
-    /// the learning rates (--set stage.finetune.encoder.learning_rate.rate=1e-3, and likewise decoder, for others)
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "config")]
-    pretrain: Vec<PathBuf>,
-
-    /// The same with N generated scenes, alone or beside the panoramas of --pretrain
-    #[arg(long, value_name = "N", conflicts_with = "config")]
-    pretrain_synthetic: Option<usize>,
-
-    /// Number of updates of --pretrain and --pretrain-synthetic [default: as many as follow]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pretrain_steps: Option<u64>,
-
-    /// What is trained [default: veni]
-    #[arg(long, value_enum, conflicts_with = "config")]
-    system: Option<SystemName>,
-
-    /// Starting point for all settings [default: small]
-    #[arg(long, value_enum, conflicts_with = "config")]
-    preset: Option<PresetName>,
-
-    /// Number N of latent vectors; the article's D is 3N [default: 9]
-    #[arg(long, short = 'n', value_name = "N", conflicts_with = "config")]
-    latent_vectors: Option<usize>,
-
-    /// Seed of everything random [default: the preset's]
-    #[arg(long, short, value_name = "S")]
-    seed: Option<u64>,
-
-    /// Number of updates; learning rates fall accordingly [default: the preset's]
-    #[arg(long, value_name = "N")]
-    steps: Option<u64>,
-
-    /// Settings from a file, such as another run's config.toml, instead of a preset
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-
-    /// Change one setting by its name in config.toml; may be given several times
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-
-    /// What computes [default: flex, or what the file of --config says]
-    #[arg(long, value_enum)]
-    device: Option<TrainDevice>,
-
-    /// Which devices of that kind, counted from 0: each computes a part of every batch [default: the first; on a
-    /// processor as many shares of its threads as divide a batch evenly]
-    #[arg(long, value_name = "I,J,…")]
-    devices: Option<Devices>,
-
-    /// Multiply the decoder's matrices in bfloat16, sums and all else in f32 (decoder_by = kernels-bfloat16): faster on
-    /// processors with AVX512-BF16, an error on others
-    #[arg(long)]
-    mixed_precision: bool,
-
-    /// Continue the run in RUN; other settings, if given, must be its own, but for --set data.scratch and
-    /// data.memory_mib, which change no result
-    #[arg(long, conflicts_with = "force")]
-    resume: bool,
-
-    /// Begin anew in place of the run in RUN, once the data is known to be good
-    #[arg(long, short)]
-    force: bool,
-}
-
-/// The systems by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum SystemName {
-    /// The auto-encoder of the article
-    #[default]
-    Veni,
-    /// The auto-decoder that it is compared with: no encoder, a latent for each training panorama
-    #[value(name = "reni++")]
-    Reni,
-}
-
-/// The presets by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum PresetName {
-    /// Trains in seconds and is good for nothing but tests
-    Tiny,
-    /// As good as an hour or two on two CPU cores can buy
-    Small,
-    /// The article's sizes, for a graphics card
-    Paper,
-}
-
-impl From<PresetName> for Preset {
-    fn from(name: PresetName) -> Self {
-        match name {
-            PresetName::Tiny => Self::Tiny,
-            PresetName::Small => Self::Small,
-            PresetName::Paper => Self::Paper,
-        }
-    }
-}
-
-/// The devices by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum TrainDevice {
-    /// The fastest of this build and machine: cuda, then wgpu on a graphics card, then flex
-    Auto,
-    /// All CPU cores, through burn's flex backend
-    Flex,
-    /// All CPU cores, through burn's ndarray backend (feature ndarray)
-    Ndarray,
-    /// A graphics device by Vulkan, Metal or DirectX 12 (feature wgpu)
-    Wgpu,
-    /// An NVIDIA card by CUDA (feature cuda)
-    Cuda,
-}
-
-impl From<TrainDevice> for DeviceKind {
-    fn from(device: TrainDevice) -> Self {
-        match device {
-            TrainDevice::Auto => Self::fastest(),
-            TrainDevice::Flex => Self::Flex,
-            TrainDevice::Ndarray => Self::Ndarray,
-            TrainDevice::Wgpu => Self::Wgpu,
-            TrainDevice::Cuda => Self::Cuda,
-        }
-    }
-}
+pub(crate) use args::Train;
 
 impl Train {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
@@ -225,9 +48,9 @@ impl Train {
             ));
         }
         let stop = stop_on_signal()?;
-        let mut watch = Watch::new(report);
-        let finish = trainer.run(&stop, &mut watch).map_err(with_remedy)?;
-        watch.finish();
+        let bars = Bars::new(report);
+        let finish = trainer.run(&stop, &mut &bars).map_err(with_remedy)?;
+        bars.end();
         let (done, total) = (trainer.steps_done(), trainer.config().steps);
         let best = run::best(&self.out)?;
         self.report(report, finish, [done, total], best.as_ref(), started)?;
@@ -245,17 +68,32 @@ impl Train {
     fn begun(&self, report: Report) -> Result<Trainer> {
         let config = self.settings()?;
         let replace = self.check_folder()?;
-        let loading = Loading::new(report);
+        let bars = Bars::new(report);
         let trainer =
-            Trainer::prepare(&self.out, config, &self.command_line(), &|done, all| loading.set(done, all));
-        loading.finish();
-        let trainer = trainer.map_err(with_remedy)?;
+            Trainer::prepare(&self.out, config, &self.command_line(), &|done, all| bars.loading(done, all));
+        bars.end();
+        let trainer = trainer.map_err(|e| self.with_options(e))?;
         if replace {
             // what is there goes only now, when the new data is known to be good
             self.clear()?;
         }
         trainer.begin().map_err(with_remedy)?;
         Ok(trainer)
+    }
+
+    /// Adds to an error what the options of this command can do about it.
+    fn with_options(&self, error: Error) -> anyhow::Error {
+        match error {
+            Error::Unsupported(_) if self.device == Some(TrainDevice::Wgpu) && self.devices.is_some() => {
+                anyhow!("{error}; 'veni-cli inspect --devices' lists the adapters")
+            }
+            // what the model differs in: the settings by the options that change them
+            Error::Invalid(text) if self.init.is_some() => anyhow!(
+                text.replace(": set model.latent_vectors=", ": --latent-vectors ")
+                    .replace(": set model.", ": --set model.")
+            ),
+            error => with_remedy(error),
+        }
     }
 
     /// A run that exists.
@@ -269,12 +107,12 @@ impl Train {
         }
         self.check_same(&stored)?;
         let holding = self.holding(&stored)?;
-        let loading = Loading::new(report);
+        let bars = Bars::new(report);
         let trainer = Trainer::resume_heard(&self.out, &self.command_line(), &holding, &|done, all| {
-            loading.set(done, all);
+            bars.loading(done, all);
         });
-        loading.finish();
-        Ok(trainer?)
+        bars.end();
+        trainer.map_err(with_remedy)
     }
 
     fn report(
@@ -355,11 +193,4 @@ fn stop_on_signal() -> Result<Arc<AtomicBool>> {
     })
     .context("cannot watch for Ctrl-C")?;
     Ok(stop)
-}
-
-/// Quoted if a shell would split it.
-fn shell_word(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "/._-+,=@%".contains(c);
-    if text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }

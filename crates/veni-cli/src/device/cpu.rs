@@ -3,7 +3,7 @@
 use veni_light::field::Field;
 use veni_light::sphere::{CubeFace, Frame};
 
-use super::Directions;
+use super::directions::Directions;
 use crate::output::Push;
 
 /// Pixels of a cube map that are decoded at a time.

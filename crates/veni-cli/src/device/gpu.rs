@@ -13,7 +13,7 @@ use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::AdapterInfo;
 use veni_gpu::{GpuDecoder, GpuLatents};
 
-use super::Directions;
+use super::directions::Directions;
 use crate::args::DecodeDevice;
 use crate::output::Push;
 use crate::report::Report;

@@ -8,7 +8,7 @@ mod tests;
 
 pub use veni_fit::{
     Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective, Observation,
-    PanoramaLoss, Picture, Plateau, from_each, loss, matching_exposure, random_starts, schedule, shade,
+    PanoramaLoss, Plateau, from_each, loss, matching_exposure, random_starts, schedule, shade,
 };
 
 use burn::tensor::Device;
@@ -65,7 +65,7 @@ impl<'a> FitDecoder<'a> {
 /// Optimises one latent per image from `start`, under any objective.
 ///
 /// # Errors
-/// As [`veni_fit::fit`]; and if the objective cannot take masks, clipped values or views that are given.
+/// As [`veni_fit::fit`]; and if the objective cannot take the masks, clipped values or views that are given.
 pub fn fit<'a>(
     decoder: impl Into<FitDecoder<'a>>,
     target: &FitTarget<'_>,
@@ -87,7 +87,6 @@ pub fn fit_observed<'a>(
     observer: &mut dyn FnMut(u64, f64),
 ) -> Result<FitResult> {
     let decoder = decoder.into();
-    target.check()?;
     let whole = WholeLoss::new(config, target, &decoder.device())?;
     let whole = whole.as_ref().map(|loss| loss as &dyn PanoramaLoss);
     veni_fit::fit_with(decoder.as_dyn(), target, start, config, whole, observer)
@@ -107,7 +106,7 @@ pub fn best_of<'a>(
     config: &FitConfig,
     observer: &mut dyn FnMut(u64, f64),
 ) -> Result<Best> {
-    assert!(target.images.len() == 1, "one image");
+    assert!(target.count() == 1, "one image");
     let decoder = decoder.into();
     from_each(starts, config, observer, |start, observer| fit_observed(decoder, target, start, config, observer))
 }

@@ -51,7 +51,7 @@ fn the_fast_way_and_the_graph_go_the_same_way() {
     let folded = model(&decoder).decoder().unwrap();
     let images = [1, 2].map(|seed| image(&decoder, grid, seed));
     let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
-    let target = FitTarget::panoramas(grid, &views);
+    let target = FitTarget::panoramas(grid, &views).unwrap();
     let start = [3, 4].map(latent);
     for objective in objectives() {
         let config =
@@ -77,7 +77,7 @@ fn losses_over_whole_images_take_no_masks() {
     let (decoder, grid) = (decoder(), Equirect::new(16, 8));
     let image = image(&decoder, grid, 1);
     let (images, mask) = ([image.as_slice()], vec![1.0; grid.len()]);
-    let masked = FitTarget { masks: Some(&[&mask]), ..FitTarget::panoramas(grid, &images) };
+    let masked = FitTarget::panoramas(grid, &images).unwrap().masked(&[&mask]).unwrap();
     for objective in &objectives()[5..] {
         let config = FitConfig { objective: *objective, ..FitConfig::light() };
         let message = fit(&decoder, &masked, &[latent(1)], &config).unwrap_err().to_string();
@@ -91,7 +91,7 @@ fn where_it_does_not_apply_it_is_refused_and_auto_takes_adam() {
     let folded = model(&decoder).decoder().unwrap();
     let image = image(&decoder, grid, 1);
     let views = [image.as_slice()];
-    let target = FitTarget::panoramas(grid, &views);
+    let target = FitTarget::panoramas(grid, &views).unwrap();
     let start = [latent(2)];
     let config = FitConfig { steps: 5, method: Method::LevenbergMarquardt, ..FitConfig::thorough() };
     let message = fit(&decoder, &target, &start, &config).unwrap_err().to_string();

@@ -22,13 +22,13 @@ enum Kind {
 impl WholeLoss {
     /// Nothing if the objective looks at each pixel alone.
     pub(super) fn new(config: &FitConfig, target: &FitTarget<'_>, device: &Device) -> Result<Option<Self>> {
-        let (width, height) = (target.grid.width, target.grid.height);
+        let (width, height) = (target.grid().width, target.grid().height);
         let (name, kind) = match config.objective {
             Objective::CosineScaleInvariant => {
                 ("cosine-scale-invariant", Kind::Rays { level: config.free_exposure })
             }
             Objective::Terms(losses) => {
-                if target.directions.is_some() || target.areas.is_some() {
+                if !target.is_panoramic() {
                     return Err(Error::invalid(
                         "the objective terms compares whole panoramas; use log-error for other views",
                     ));
@@ -50,13 +50,14 @@ impl WholeLoss {
             }
             _ => return Ok(None),
         };
-        if target.masks.is_some() || target.clipped.is_some() {
+        if target.is_partial() {
             return Err(Error::invalid(format!(
                 "the objective {name} takes no masks and no clipped values; use log-error, log-absolute or display"
             )));
         }
-        let shape = [target.images.len(), height, width, 3];
-        let target = Tensor::from_data(TensorData::new(target.images.concat(), shape), device);
+        let images: Vec<_> = (0..target.count()).map(|b| target.image(b)).collect();
+        let shape = [target.count(), height, width, 3];
+        let target = Tensor::from_data(TensorData::new(images.concat(), shape), device);
         Ok(Some(Self { kind, target }))
     }
 

@@ -111,7 +111,7 @@ fn differences(config: &TrainConfig, model: &Model, whole: bool) -> Result<Vec<S
     let mut found = Vec::new();
     if ours.latent_vectors != theirs.latent_vectors {
         found.push(format!(
-            "the model has {n} latent vectors, this run {}: --latent-vectors {n}",
+            "the model has {n} latent vectors, this run {}: set model.latent_vectors={n}",
             ours.latent_vectors,
             n = theirs.latent_vectors
         ));
@@ -129,7 +129,7 @@ fn differences(config: &TrainConfig, model: &Model, whole: bool) -> Result<Vec<S
             match theirs.get(key) {
                 theirs if theirs == ours.get(key) => {}
                 Some(theirs) => found.push(format!(
-                    "the model has {name} = {theirs}, this run {ours_text}: --set {name}={theirs}"
+                    "the model has {name} = {theirs}, this run {ours_text}: set {name}={theirs}"
                 )),
                 None => found.push(format!(
                     "the model has the default of {name}, this run {ours_text}: leave this option out"
@@ -202,11 +202,11 @@ mod tests {
             apply(network(&config), &config, &model).unwrap_err().to_string()
         };
         let wider = refused(3, &["model.decoder.hidden=32"]);
-        for word in ["tensor decoder.", "shape", "--set model.decoder.hidden=16"] {
+        for word in ["tensor decoder.", "shape", "set model.decoder.hidden=16"] {
             assert!(wider.contains(word), "{wider}");
         }
         let more = refused(4, &[]);
-        assert!(more.contains("tensor decoder.") && more.contains("--latent-vectors 3"), "{more}");
+        assert!(more.contains("tensor decoder.") && more.contains("model.latent_vectors=3"), "{more}");
         let deeper = refused(3, &["model.encoder.depth=3"]);
         assert!(deeper.contains("tensor encoder.") && deeper.contains("model.encoder.depth=2"), "{deeper}");
         // the same shapes, another network

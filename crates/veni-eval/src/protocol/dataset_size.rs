@@ -19,8 +19,8 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     for subject in run.subjects {
         let size = subject.training_panoramas().ok_or_else(|| {
             Error::invalid(format!(
-                "{}: its file does not say on how many panoramas it was trained; leave this model out, or train it with \
-                 'veni-cli train', which records it",
+                "{}: its file does not say on how many panoramas it was trained; leave this model out, or train it \
+                 anew: a training run records it",
                 subject.name()
             ))
         })?;

@@ -31,7 +31,7 @@ impl Published {
     pub fn load(path: &Path) -> Result<Self> {
         let size = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len();
         if size > MAX_BYTES {
-            return Err(Error::invalid("too large for a file of published numbers").in_file(path));
+            return Err(Error::too_large("too large for a file of published numbers").in_file(path));
         }
         let text = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
         serde_json::from_slice(&text).map_err(|e| {

@@ -21,7 +21,7 @@ pub struct FitConfig {
     pub epsilon: f64,
     /// What is compared.
     pub objective: Objective,
-    /// Weight of −ln p of the latent, divided by N, p being [`FitTarget::prior`](super::FitTarget::prior) (½ mean
+    /// Weight of −ln p of the latent, divided by N, p being [`FitTarget::with_prior`](super::FitTarget::with_prior) (½ mean
     /// |z|² where none is given); 0: off.
     pub prior: f64,
     /// Whether each latent's log exposure is optimised too.

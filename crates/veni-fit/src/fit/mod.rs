@@ -2,7 +2,7 @@
 //!
 //! Every image has its own latent Z [N, 3] and log exposure s: the decoded log radiance plus s is compared with
 //! the image. s stays as it is unless it is asked to be free. An image may be a panorama, a part of one
-//! ([`FitTarget::masks`]), or a view in any directions, clipped values included.
+//! ([`FitTarget::masked`]), or a view in any directions, clipped values included.
 
 mod adam;
 mod config;
@@ -44,8 +44,8 @@ pub struct FitResult {
 /// Optimises one latent per image from `start`.
 ///
 /// # Errors
-/// [`Error::Invalid`] if the numbers of images, masks and starts or their sizes disagree, if there are none,
-/// if the objective cannot take clipped values that are given, or if the loss is no longer finite;
+/// [`Error::Invalid`] if the numbers of images and starts or their sizes disagree, if a value that counts is not finite,
+/// or if the loss is no longer finite;
 /// [`Error::Unsupported`] for an objective over whole images: [`fit_with`] takes those.
 pub fn fit(
     decoder: &dyn LatentDecoder,
@@ -70,10 +70,10 @@ pub fn fit_with(
     observer: &mut dyn FnMut(u64, f64),
 ) -> Result<FitResult> {
     config.check()?;
-    target.check()?;
+    target.check_finite()?;
     let n = decoder.latent_vectors();
-    check_starts(start, target.images.len(), n)?;
-    check_prior(target.prior, n)?;
+    check_starts(start, target.count(), n)?;
+    check_prior(target.prior(), n)?;
     let loss = match (loss, config.objective.is_pixelwise()) {
         (_, true) => ImageLoss::Pixels(PixelLoss::of_images(config.objective, target)),
         (Some(loss), false) => ImageLoss::Whole(loss),
@@ -85,7 +85,7 @@ pub fn fit_with(
         }
     };
     let network = Network::new(decoder, target.directions());
-    optimise(&network, &loss, target.prior, start, config, observer)
+    optimise(&network, &loss, target.prior(), start, config, observer)
 }
 
 fn check_starts(start: &[Latent], images: usize, n: usize) -> Result<()> {

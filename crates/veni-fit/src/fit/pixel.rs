@@ -1,7 +1,7 @@
 //! Losses that look at each pixel alone, with their derivatives, in f64. MODEL (43–47).
 
 use super::config::Objective;
-use super::target::FitTarget;
+use super::target::{FitTarget, TargetImage};
 use veni_image::{luminance, tonemap};
 
 /// Where the absolute error turns from a parabola into a line, in log radiance.
@@ -39,13 +39,11 @@ impl<'a> PixelLoss<'a> {
     /// Of each image, under an objective that [looks at each pixel alone](Objective::is_pixelwise).
     pub(super) fn of_images(objective: Objective, target: &FitTarget<'a>) -> Vec<Self> {
         let areas = target.areas();
-        (0..target.images.len()).map(|b| Self::new(objective, target, b, &areas)).collect()
+        target.images().iter().map(|image| Self::new(objective, *image, &areas)).collect()
     }
 
-    /// For image `b`.
-    pub(super) fn new(objective: Objective, target: &FitTarget<'a>, b: usize, areas: &[f64]) -> Self {
-        let image = target.images[b];
-        let mask = target.masks.map(|masks| masks[b]);
+    pub(super) fn new(objective: Objective, image: TargetImage<'a>, areas: &[f64]) -> Self {
+        let TargetImage { log_radiance: image, mask, clipped } = image;
         let pixels = areas.len() as f64;
         let counts = |p: usize| mask.map_or(1.0, |m| f64::from(m[p]));
         let weights: Vec<f64> = match objective {
@@ -66,7 +64,7 @@ impl<'a> PixelLoss<'a> {
             }
             _ => (0.0, Vec::new()),
         };
-        Self { objective, image, clipped: target.clipped.map(|c| c[b]), weights, light, white, shown }
+        Self { objective, image, clipped, weights, light, white, shown }
     }
 
     /// The pixel's part of the loss for log radiance `prediction`.

@@ -43,7 +43,7 @@ pub fn best_of(
     config: &FitConfig,
     watch: &mut dyn FnMut(u64, f64),
 ) -> Result<Best> {
-    assert!(target.images.len() == 1, "one image");
+    assert!(target.count() == 1, "one image");
     from_each(starts, config, watch, |start, watch| fit_with(decoder, target, start, config, None, watch))
 }
 

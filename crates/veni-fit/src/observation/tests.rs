@@ -7,8 +7,8 @@ fn sky(size: [usize; 2]) -> Vec<[f32; 3]> {
         .to_vec()
 }
 
-fn whole(pixels: &[[f32; 3]], size: [usize; 2]) -> Picture<'_> {
-    Picture { size, pixels, known: None, clip: None }
+fn whole(pixels: &[[f32; 3]], size: [usize; 2]) -> Picture {
+    Picture::new(size, pixels.to_vec()).unwrap()
 }
 
 #[test]
@@ -38,7 +38,7 @@ fn what_is_unknown_leaves_no_trace() {
         pixels[p] = [[f32::NAN; 3], [f32::INFINITY, 1.0, 1.0], [1e9; 3]][p % 3];
     }
     let known: Vec<f32> = (0..512).map(|p| if gone(p) && p % 3 == 2 { 0.0 } else { 1.0 }).collect();
-    let seen = Observation::panorama(&Picture { known: Some(&known), ..whole(&pixels, size) }, grid).unwrap();
+    let seen = Observation::panorama(&whole(&pixels, size).masked(&known).unwrap(), grid).unwrap();
     let mask = seen.mask.as_ref().unwrap();
     let truth = Observation::panorama(&whole(&sky(size), size), grid).unwrap();
     for (p, known) in mask.iter().enumerate() {
@@ -61,7 +61,7 @@ fn a_photograph_sees_what_the_panorama_has_there() {
     let (directions, _) = view.pixels(90, 60);
     let pixels: Vec<_> = directions.into_iter().map(light).collect();
     let seen =
-        Observation::photograph(&Picture { clip: Some(2.9), ..whole(&pixels, [90, 60]) }, &view, 45).unwrap();
+        Observation::photograph(&whole(&pixels, [90, 60]).clipped_at(2.9), &view, 45).unwrap();
     assert_eq!((seen.grid.width, seen.grid.height), (45, 30));
     let (directions, areas) = seen.view.as_ref().unwrap();
     let covered = areas.iter().sum::<f32>() / (4.0 * PI as f32);
@@ -81,10 +81,9 @@ fn a_photograph_sees_what_the_panorama_has_there() {
 fn what_cannot_be_seen_is_refused() {
     let pixels = vec![[0.0; 3]; 8];
     let message =
-        |picture: &Picture<'_>| Observation::panorama(picture, Equirect::new(4, 2)).unwrap_err().to_string();
-    assert!(message(&whole(&pixels, [4, 2])).contains("nothing of the picture"));
+        |picture: &Picture| Observation::panorama(picture, Equirect::new(4, 2)).unwrap_err().to_string();
+    assert!(message(&whole(&pixels, [4, 2])).contains("no known pixel"));
     assert!(message(&whole(&pixels, [2, 4])).contains("twice its height"));
-    assert!(message(&whole(&pixels, [6, 3])).contains("8 pixels"));
     let view = View { fov: PI, azimuth: 0.0, elevation: 0.0, roll: 0.0 };
     let wide = Observation::photograph(&whole(&pixels, [4, 2]), &view, 64).unwrap_err().to_string();
     assert!(wide.contains("180"), "{wide}");

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::vector::{length, narrow, unit_f32, wide};
 use veni_image::tonemap::srgb_to_linear;
-use veni_image::{Panorama, ReadOptions};
+use veni_image::{LdrPanorama, Panorama, ReadOptions};
 use crate::{Error, Result};
 
 /// A normal counts if its length lies strictly between these (MODEL, Rendered images).
@@ -37,8 +37,7 @@ impl NormalMap {
     /// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is no such image.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let (size, normals) = if is_png(path)? {
-            let (size, pixels) = png(path)?;
+        let (size, normals) = if let Some((size, pixels)) = display(path)? {
             let decode = |[r, g, b, a]: [f32; 4]| {
                 let seen = a >= 0.5 && [r, g, b] != [0.0; 3];
                 if seen { [r, g, b].map(|v| 2.0 * v - 1.0) } else { [0.0; 3] }
@@ -108,20 +107,14 @@ fn taps(source: usize, target: usize) -> Vec<[(usize, f64); 2]> {
         .collect()
 }
 
-/// Reads a mask: a pixel belongs to the surface where its luminance (times alpha) is at least one half. PNG, EXR or
-/// Radiance. Returns [W, H] and the values, row-major.
+/// Reads a mask: a pixel belongs to the surface where its luminance (times alpha) is at least one half. Returns [W, H] and
+/// the values, row-major.
 ///
 /// # Errors
-/// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is no such image.
+/// As [`veni_image::read_mask`].
 pub fn read_mask(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<bool>)> {
-    let path = path.as_ref();
-    if is_png(path)? {
-        let (size, pixels) = png(path)?;
-        let inside = |[r, g, b, a]: [f32; 4]| veni_image::luminance([r, g, b]) * a >= 0.5;
-        return Ok((size, pixels.into_iter().map(inside).collect()));
-    }
-    let (size, pixels) = linear(path)?;
-    Ok((size, pixels.into_iter().map(|p| veni_image::luminance(p) >= 0.5).collect()))
+    let (size, mask) = veni_image::read_mask(path)?;
+    Ok((size, mask.into_iter().map(|m| m >= 0.5).collect()))
 }
 
 /// Reads an albedo map as linear reflectance: EXR and Radiance as they stand, PNG through the sRGB curve. Returns [W, H]
@@ -131,8 +124,7 @@ pub fn read_mask(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<bool>)> {
 /// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is no such image.
 pub fn read_albedo(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<[f32; 3]>)> {
     let path = path.as_ref();
-    if is_png(path)? {
-        let (size, pixels) = png(path)?;
+    if let Some((size, pixels)) = display(path)? {
         return Ok((size, pixels.into_iter().map(|[r, g, b, _]| [r, g, b].map(srgb_to_linear)).collect()));
     }
     linear(path)
@@ -144,23 +136,15 @@ fn linear(path: &Path) -> Result<([usize; 2], Vec<[f32; 3]>)> {
     Ok(([grid.width, grid.height], image.into_pixels()))
 }
 
-fn is_png(path: &Path) -> Result<bool> {
-    use std::io::Read;
-    let file = std::fs::File::open(path).map_err(|e| Error::io(path, "open", e))?;
-    let mut start = Vec::new();
-    file.take(8).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
-    Ok(start == b"\x89PNG\r\n\x1a\n")
-}
-
-/// Values 0 to 1, not linearised: red, green, blue, alpha.
-fn png(path: &Path) -> Result<([usize; 2], Vec<[f32; 4]>)> {
-    let reader = image::ImageReader::open(path).map_err(|e| Error::io(path, "open", e))?;
-    let mut reader = reader.with_guessed_format().map_err(|e| Error::io(path, "read", e))?;
-    reader.limits(image::Limits::default());
-    let decoded = reader.decode().map_err(|e| Error::invalid(format!("{}: {e}", path.display())))?;
-    let rgba = decoded.to_rgba32f();
-    let size = [rgba.width() as usize, rgba.height() as usize];
-    Ok((size, rgba.into_raw().as_chunks::<4>().0.to_vec()))
+/// Values 0 to 1, not linearised: red, green, blue, alpha; where the file is one of display values.
+fn display(path: &Path) -> Result<Option<([usize; 2], Vec<[f32; 4]>)>> {
+    if !LdrPanorama::recognise(path)? {
+        return Ok(None);
+    }
+    let image = LdrPanorama::read_with(path, &ReadOptions { any_aspect: true, ..ReadOptions::default() })?;
+    let alpha = |p: usize| image.alpha().map_or(1.0, |alpha| alpha[p]);
+    let pixels = image.values().iter().enumerate().map(|(p, [r, g, b])| [*r, *g, *b, alpha(p)]).collect();
+    Ok(Some(([image.grid().width, image.grid().height], pixels)))
 }
 
 #[cfg(test)]

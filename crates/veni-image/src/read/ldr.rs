@@ -14,12 +14,13 @@ use crate::{Error, Result};
 
 /// A panorama of limited dynamic range: display values in [0, 1], as an 8- or 16-bit file has them, row-major.
 /// They become radiance by [`LdrPanorama::linear`], or with what is clipped rebuilt by
-/// [`LdrPanorama::expand`](crate::expand).
+/// veni-data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LdrPanorama {
     grid: Equirect,
     values: Vec<[f32; 3]>,
-    pub(super) transparent: f64,
+    /// Of every pixel, 0 to 1, where the file hides any.
+    pub(super) alpha: Option<Vec<f32>>,
 }
 
 /// How display values become linear ones.
@@ -51,7 +52,7 @@ impl LdrPanorama {
         let Equirect { width, height } = grid;
         assert_eq!(values.len(), grid.len(), "a {width} × {height} panorama got {} pixels", values.len());
         let values = values.into_iter().map(|p| p.map(|v| v.clamp(0.0, 1.0))).collect();
-        Self { grid, values, transparent: 0.0 }
+        Self { grid, values, alpha: None }
     }
 
     /// Whether the content of `path` is a format that [`LdrPanorama::read`] reads: a look at its first bytes.
@@ -97,7 +98,13 @@ impl LdrPanorama {
 
     /// Share of the pixels (0 to 1) that the file's alpha channel hides by more than half; 0 without one.
     pub fn transparent(&self) -> f64 {
-        self.transparent
+        let hidden = self.alpha.as_ref().map_or(0, |alpha| alpha.iter().filter(|a| **a < 0.5).count());
+        hidden as f64 / self.grid.len() as f64
+    }
+
+    /// The alpha channel, 0 to 1 for every pixel; `None` where there is none, or it hides nothing.
+    pub fn alpha(&self) -> Option<&[f32]> {
+        self.alpha.as_deref()
     }
 
     /// Plain linearisation: white is radiance 1, and so is everything that was brighter.
@@ -174,22 +181,22 @@ fn on_its_side(orientation: Orientation) -> bool {
     matches!(orientation, Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH)
 }
 
-/// Display values of any sample layout, and how much of them is hidden.
+/// Display values of any sample layout, and their alpha.
 fn values(grid: Equirect, image: &DynamicImage) -> LdrPanorama {
-    let mut hidden = 0;
     let mut values = Vec::with_capacity(grid.len());
+    let mut alpha = None;
     match image {
         DynamicImage::ImageRgb8(rgb) => {
             values.extend(rgb.pixels().map(|p| p.0.map(|v| f32::from(v) / 255.0)));
         }
         other => {
             let rgba = other.to_rgba16();
-            values.extend(rgba.pixels().map(|p| {
-                let [r, g, b, a] = p.0.map(|v| f32::from(v) / 65535.0);
-                hidden += usize::from(a < 0.5);
-                [r, g, b]
-            }));
+            let unit = |v: u16| f32::from(v) / 65535.0;
+            values.extend(rgba.pixels().map(|p| [p.0[0], p.0[1], p.0[2]].map(unit)));
+            if rgba.pixels().any(|p| p.0[3] < u16::MAX) {
+                alpha = Some(rgba.pixels().map(|p| unit(p.0[3])).collect());
+            }
         }
     }
-    LdrPanorama { grid, values, transparent: hidden as f64 / grid.len() as f64 }
+    LdrPanorama { grid, values, alpha }
 }

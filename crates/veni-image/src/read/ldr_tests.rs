@@ -50,7 +50,7 @@ fn sample_layouts_of_png_jpeg_and_webp() {
     assert_eq!(LdrPanorama::read(&path).unwrap().transparent(), 1.0);
     // radiance only where the file holds it
     let error = Panorama::read(&path).unwrap_err().to_string();
-    assert!(error.contains("WebP") && error.contains("veni-cli prepare"), "{error}");
+    assert!(error.contains("WebP") && error.contains("expand"), "{error}");
     assert!((Transfer::Srgb.linear(0.5) - 0.214_041).abs() < 1e-5);
 }
 
@@ -126,7 +126,7 @@ fn damaged_oversized_and_foreign_files_are_refused() {
         refused(
             "a.avif",
             b"\0\0\0\x20ftypavif\0\0\0\0mif1",
-            &["built without --features avif", "AVIF", "convert"],
+            &["built without the feature avif", "AVIF", "convert"],
         );
     }
 }

@@ -49,7 +49,7 @@ impl ReadOptions {
             return Err(Error::invalid(format!("the header says {width} × {height}: there are no pixels")));
         }
         if width.checked_mul(height).is_none_or(|n| n > self.max_pixels) {
-            return Err(Error::invalid(format!(
+            return Err(Error::too_large(format!(
                 "the header claims {width} × {height} pixels, more than the limit of {}",
                 self.max_pixels
             )));
@@ -86,7 +86,7 @@ impl Panorama {
     /// [`HalfRange::Fit`]: super::HalfRange::Fit
     ///
     /// # Errors
-    /// [`Error::Unsupported`] for formats with a limited range (PNG, JPEG, …), cube maps, deep, subsampled or
+    /// [`Error::LowRange`] for formats with a limited range (PNG, JPEG, …); [`Error::Unsupported`] for cube maps, deep, subsampled or
     /// XYZ-coded images; [`Error::Invalid`] for damaged files and for sizes that `options` refuse;
     /// [`Error::Io`] if the file cannot be read.
     pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
@@ -161,7 +161,7 @@ const LDR: &[(usize, &[u8], ImageFormat, &str)] = &[
 /// Formats that are not read: where the name of each stands.
 const FOREIGN: [(usize, &[u8], &str); 7] = [
     // with the feature `avif` found before
-    (4, b"ftypavif", "(built without --features avif) AVIF"),
+    (4, b"ftypavif", "(built without the feature avif) AVIF"),
     (4, b"ftypavis", "Animated AVIF"),
     (4, b"ftypheic", "HEIF"),
     (0, b"BM", "BMP"),
@@ -187,10 +187,8 @@ fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
     if start.starts_with(b"#?") {
         return Ok(Kind::Hdr { strict: start.starts_with(b"#?RADIANCE") });
     }
-    if let Some((.., name)) = LDR.iter().find(|(at, magic, ..)| stands(&start, *at, magic)) {
-        return Err(Error::unsupported(format!(
-            "{name} holds no high dynamic range; `veni-cli prepare` expands such panoramas into EXR files first"
-        )));
+    if let Some((.., format)) = LDR.iter().find(|(at, magic, ..)| stands(&start, *at, magic)) {
+        return Err(Error::LowRange { path: path.to_path_buf(), format });
     }
     Err(unknown(&start, "neither an OpenEXR nor a Radiance .hdr file"))
 }

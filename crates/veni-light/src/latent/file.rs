@@ -91,7 +91,7 @@ impl Latent {
         let mut bytes = Vec::new();
         file.take(MAX_LATENT_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
         if bytes.len() as u64 > MAX_LATENT_BYTES {
-            return Err(Error::invalid("not a latent (too large)").in_file(path));
+            return Err(Error::too_large("not a latent (too large)").in_file(path));
         }
         let text =
             String::from_utf8(bytes).map_err(|_| Error::invalid("not a latent (no text)").in_file(path))?;

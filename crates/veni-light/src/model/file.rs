@@ -59,9 +59,7 @@ impl Model {
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(broken)?;
         let entry = metadata.metadata().as_ref().and_then(|entries| entries.get("veni"));
         let json = entry.ok_or_else(|| {
-            Error::invalid(
-                "safetensors without a `veni` header entry; `veni-cli import` reads the authors' checkpoints",
-            )
+            Error::invalid("not a veni model file: safetensors without a `veni` header entry")
         })?;
         let (config, info) = header::from_json(json)?;
         let file = SafeTensors::deserialize(bytes).map_err(broken)?;
@@ -113,7 +111,7 @@ impl Model {
 }
 
 fn too_large() -> Error {
-    Error::invalid(format!("larger than {} MiB, no model of ours", MAX_FILE_BYTES >> 20))
+    Error::too_large(format!("larger than {} MiB, no model of ours", MAX_FILE_BYTES >> 20))
 }
 
 fn values<const B: usize>(bytes: &[u8], decode: impl Fn([u8; B]) -> f32) -> Vec<f32> {

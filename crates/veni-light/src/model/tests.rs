@@ -145,7 +145,7 @@ fn damaged_and_foreign_files_are_refused() {
     says(&patched("z-up", "y-up"), "y-up");
     says(&patched(r#"kind\":\"veni"#, r#"kind\":\"reni"#), "kind");
     says(&patched(r#"\"layers\":2"#, r#"\"layers\":3"#), "layers.2");
-    says(&patched(r#""veni""#, r#""xeni""#), "veni-cli import");
+    says(&patched(r#""veni""#, r#""xeni""#), "not a veni model file");
     says(&patched(r#"\"heads\""#, r#"\"beads\""#), "beads");
     let error = Model::load("/nowhere/at all.safetensors").unwrap_err();
     assert!(matches!(&error, Error::Io { .. }) && error.to_string().contains("/nowhere/at all"));

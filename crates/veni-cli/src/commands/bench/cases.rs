@@ -39,7 +39,7 @@ pub(super) fn all(args: &ModelArgs, latent_vectors: &[usize], report: Report) ->
         (Ok(loaded), None) => cases.push(Case::new("embedded", loaded.model)),
         (Err(error), Some(_)) => return Err(error),
         // a build without a model can still measure the others
-        (Err(error), None) => report.note(format_args!("note: {error}")),
+        (Err(error), None) => report.note(format_args!("note: {error:#}")),
     }
     for n in latent_vectors {
         let model = Model::filler(&ModelConfig::decode_only(*n), 1)

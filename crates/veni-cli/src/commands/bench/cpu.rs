@@ -8,7 +8,8 @@ use anyhow::Result;
 use veni_light::field::{self, Field};
 use veni_light::sphere::Equirect;
 
-use super::{Bakes, Case, Subject};
+use super::cases::Case;
+use super::subject::{Bakes, Subject};
 use crate::device::CPU;
 
 /// All cores.

@@ -12,7 +12,8 @@ use veni_gpu::wgpu::{
 };
 use veni_gpu::{Bake, GpuDecoder, GpuLatents, probe};
 
-use super::{Bakes, Case, Subject};
+use super::cases::Case;
+use super::subject::{Bakes, Subject};
 use crate::device::gpu;
 
 /// Bytes of a pixel in a buffer: four f32.

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use veni_light::sphere::Equirect;
 
-use super::Bakes;
+use super::subject::Bakes;
 
 /// A bake that takes longer is skipped, or done once.
 const TOO_LONG: Duration = Duration::from_secs(10);

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
 use veni_light::Error;
 use veni_eval::baseline::Kind;
 use veni_data::{Fold, panorama_files};
@@ -12,13 +13,25 @@ use veni_core::LoadedModel;
 use veni_light::output::{Overwrite, existing_above, write_atomic};
 use veni_core::train::config::DeviceKind;
 
-use super::BaselineName;
 use crate::args::ModelArgs;
 use crate::output::{with_remedy, writable};
 use crate::source;
 
 /// Says that a folder is an evaluation's.
 const MARKER: &str = "evaluation.json";
+
+/// Classical bases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BaselineName {
+    /// No baseline
+    None,
+    /// Spherical harmonics of log radiance, weighted least squares
+    Sh,
+    /// Spherical Gaussians of either sign in log radiance
+    Sg,
+    /// A mixture of positive spherical Gaussians in radiance
+    Mixture,
+}
 
 /// The models to compare, under distinct names.
 pub(super) fn subjects(models: &[String], device: DeviceKind) -> Result<Vec<LoadedModel>> {

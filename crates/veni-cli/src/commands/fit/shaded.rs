@@ -14,7 +14,7 @@ use veni_fit::shade::{
 use veni_light::sphere::{Equirect, View};
 
 use super::input::Read;
-use crate::commands::render_probe::{albedo, fraction, lights, shininess};
+use crate::numbers::{albedo, fraction, lights, shininess};
 use crate::output::CAMERA;
 
 #[derive(Args, Debug)]

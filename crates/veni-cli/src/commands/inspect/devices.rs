@@ -6,7 +6,7 @@ use veni_gpu::adapters::Found;
 use veni_gpu::probe;
 use veni_gpu::wgpu::{DeviceType, Features};
 
-use super::Facts;
+use super::facts::Facts;
 use crate::device::gpu::{self, NO_ADAPTER};
 use crate::report::{self, Outcome, Report};
 

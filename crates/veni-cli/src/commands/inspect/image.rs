@@ -7,12 +7,13 @@ use serde_json::json;
 use veni_light::latent::Latent;
 use veni_image::{self, Panorama};
 
+use super::facts::Facts;
+use super::latent;
 use super::statistics::Statistics;
-use super::{Facts, latent};
-use crate::output::{CUBE_FACES, FRAME, LATENT};
+use crate::output::{CUBE_FACES, FRAME, LATENT, with_remedy};
 
 pub(super) fn describe(path: &Path) -> Result<Facts> {
-    let attributes = veni_image::attributes(path)?;
+    let attributes = veni_image::attributes(path).map_err(with_remedy)?;
     let exr = exr_facts(path)?;
     let mut facts = Facts::new(if exr.is_some() { "OpenEXR image" } else { "Radiance HDR image" });
     let cube = exr.as_ref().is_some_and(|e| e.cube) || attributes.contains_key(CUBE_FACES);

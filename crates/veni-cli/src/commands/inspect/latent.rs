@@ -6,7 +6,7 @@ use anyhow::Result;
 use serde_json::json;
 use veni_light::latent::Latent;
 
-use super::Facts;
+use super::facts::Facts;
 
 pub(super) fn describe(path: &Path) -> Result<Facts> {
     let latent = Latent::load(path)?;

@@ -2,129 +2,74 @@
 
 #[cfg(feature = "gpu")]
 mod devices;
+mod facts;
 mod image;
 mod latent;
 mod model;
 pub(crate) mod run;
 mod statistics;
 
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use serde_json::{Map, Value};
 use veni_light::Error;
 
-use crate::report::{self, Outcome, Report, is_closed_pipe};
+use crate::features::{GPU, only};
+use crate::report::{self, Outcome, Report};
+use facts::Facts;
 
-/// Show what is inside models, latents, images and training runs, or the graphics devices
+/// What is said of graphics devices.
+const DEVICES: &str = "\n\nWith --devices: every graphics device that could bake, the first of them being the one that \
+    '--device gpu' takes. Backend and driver, what it allows, which optional features (f16, subgroups) the decoder uses \
+    there, its measured rate of multiply-adds, and whether its numbers agree with the CPU's. The exit code is 1 if there \
+    is none, or if one cannot be used or computes wrong numbers.";
+
+#[cfg_attr(
+    feature = "gpu",
+    doc = "Show what is inside models, latents, images and training runs, or the graphics devices"
+)]
+#[cfg_attr(not(feature = "gpu"), doc = "Show what is inside models, latents, images and training runs")]
 #[derive(Args, Debug)]
 #[command(
-    long_about = "Show what is inside models, latents, images and training runs.\n\n\
+    long_about = format!("Show what is inside models, latents, images and training runs.\n\n\
         Model: sizes, identity, training data, prior. Latent: vectors, lengths, exposure, the model it belongs to. \
         Image: size, storage, attributes, radiance over the sphere, dynamic range, where the sun is, the latent it \
         was baked from. Run folder: how far it is, how good.\n\n\
-        The content decides what a file is, not its name. Radiance statistics are weighted by solid angle.\n\n\
-        With --devices: every graphics device that could bake, the first of them being the one that '--device gpu' \
-        takes. Backend and driver, what it allows, which optional features (f16, subgroups) the decoder uses there, \
-        its measured rate of multiply-adds, and whether its numbers agree with the CPU's. The exit code is 1 if there \
-        is none, or if one cannot be used or computes wrong numbers.",
-    after_help = "Examples:\n  \
+        The content decides what a file is, not its name. Radiance statistics are weighted by solid angle.{}",
+        only(GPU, DEVICES)),
+    after_help = format!("Examples:\n  \
         veni-cli inspect sky.exr\n  \
         veni-cli inspect --json *.exr | jq .radiance.max\n  \
-        veni-cli inspect runs/small\n  \
-        veni-cli inspect --devices"
+        veni-cli inspect runs/small{}",
+        only(GPU, "\n  veni-cli inspect --devices"))
 )]
 pub(crate) struct Inspect {
     /// Files, or folders of training runs
-    #[arg(required_unless_present = "devices", value_name = "FILE")]
+    #[cfg_attr(feature = "gpu", arg(required_unless_present = "devices"))]
+    #[cfg_attr(not(feature = "gpu"), arg(required = true))]
+    #[arg(value_name = "FILE")]
     files: Vec<PathBuf>,
 
     /// List the graphics devices instead, and measure and check each
+    #[cfg(feature = "gpu")]
     #[arg(long, conflicts_with = "files")]
     devices: bool,
 }
 
 impl Inspect {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        #[cfg(feature = "gpu")]
         if self.devices {
-            return devices(report);
+            return devices::run(report);
         }
-        let mut failed = Vec::new();
-        for path in &self.files {
+        report::each(&self.files, |path| {
             let name = path.display().to_string();
-            match describe(path) {
-                Ok(facts) => report.result(facts.text(&name), &facts.json("file", &name))?,
-                Err(error) if is_closed_pipe(&error) => return Err(error),
-                Err(error) => failed.push(error),
-            }
-        }
-        report::last_of(failed)
-    }
-}
-
-#[cfg(feature = "gpu")]
-fn devices(report: Report) -> Result<Outcome> {
-    devices::run(report)
-}
-
-#[cfg(not(feature = "gpu"))]
-fn devices(_: Report) -> Result<Outcome> {
-    bail!("inspect --devices: {}", crate::device::NO_GPU)
-}
-
-/// What a path or a device turned out to be, and its properties in the order to show them.
-pub(super) struct Facts {
-    kind: &'static str,
-    rows: Vec<(&'static str, String)>,
-    json: Map<String, Value>,
-}
-
-impl Facts {
-    pub(super) fn new(kind: &'static str) -> Self {
-        Self { kind, rows: Vec::new(), json: Map::new() }
-    }
-
-    /// A property: a line of text, and the same for machines.
-    pub(super) fn add(&mut self, name: &'static str, text: impl Into<String>, json: impl Into<Value>) {
-        self.rows.push((name, text.into()));
-        self.json.insert(name.replace([' ', '-'], "_"), json.into());
-    }
-
-    /// A property whose name comes from the file; machines find it under `attributes`.
-    pub(super) fn attribute(&mut self, name: &str, value: &str) {
-        let all = self.json.entry("attributes").or_insert_with(|| Value::Object(Map::new()));
-        if let Value::Object(all) = all {
-            all.insert(name.to_owned(), value.into());
-        }
-        self.rows.push(("attribute", format!("{name} = {value}")));
-    }
-
-    pub(super) fn has(&self, name: &str) -> bool {
-        self.json.contains_key(name)
-    }
-
-    /// All of it below a title: "name: kind".
-    fn text(&self, name: &str) -> String {
-        let mut text = format!("{name}: {}", self.kind);
-        let width = self.rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-        for (name, value) in &self.rows {
-            // writing to a String cannot fail
-            let _ = write!(text, "\n  {name:width$}  {value}");
-        }
-        text
-    }
-
-    /// All of it as one object, whose first field `key` is the name.
-    fn json(&self, key: &str, name: &str) -> Value {
-        let mut object = Map::new();
-        object.insert(key.into(), name.into());
-        object.insert("kind".into(), self.kind.into());
-        object.extend(self.json.clone());
-        object.into()
+            let facts = describe(path)?;
+            report.result(facts.text(&name), &facts.json("file", &name))
+        })
     }
 }
 

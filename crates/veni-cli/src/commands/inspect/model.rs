@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use veni_light::Error;
 use veni_light::model::{DecoderConfig, Model};
 
-use super::Facts;
+use super::facts::Facts;
 
 pub(super) fn describe(path: &Path) -> Result<Facts> {
     let size = path.metadata().map_err(|e| Error::io(path, "read", e))?.len();

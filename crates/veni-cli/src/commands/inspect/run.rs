@@ -8,7 +8,7 @@ use anyhow::{Result, bail};
 use serde_json::Value;
 use veni_light::Error;
 
-use super::Facts;
+use super::facts::Facts;
 
 /// The files that make a folder a run.
 const METRICS: &str = "metrics.jsonl";

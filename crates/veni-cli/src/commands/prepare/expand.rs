@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use serde::{Deserialize, Serialize};
 use veni_image::Transfer;
 use veni_data::expand::ExpandOptions;
 use veni_data::expand::network::{
@@ -14,6 +13,7 @@ use veni_data::expand::network::{
 use veni_data::prepare::Expander;
 use veni_light::sphere::Equirect;
 
+use super::network::NetworkSettings;
 use super::record::Fate;
 use super::store::Store;
 use crate::report::Report;
@@ -88,37 +88,6 @@ enum Scale {
     White,
     /// Its own: matched where nothing is clipped
     Match,
-}
-
-/// What is remembered of the network: images made by another one are not gone on with.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct NetworkSettings {
-    /// The file's name; it does not matter where it is.
-    pub(super) model: String,
-    pub(super) sha256: String,
-    pub(super) input: String,
-    pub(super) output: String,
-    pub(super) scale: String,
-    /// As asked for; without, the network's or the image's own.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) size: Option<String>,
-}
-
-impl PartialEq for NetworkSettings {
-    /// The same network in a renamed file is the same.
-    fn eq(&self, other: &Self) -> bool {
-        let rest = |s: &Self| [&s.sha256, &s.input, &s.output, &s.scale].map(String::clone);
-        rest(self) == rest(other) && self.size == other.size
-    }
-}
-
-impl std::fmt::Display for NetworkSettings {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { model, sha256, input, output, scale, size } = self;
-        write!(f, "{model} (sha256 {sha256}…; input {input}, output {output}, scale {scale}")?;
-        size.as_ref().map_or(Ok(()), |size| write!(f, ", size {size}"))?;
-        write!(f, ")")
-    }
 }
 
 impl Expand {

@@ -7,7 +7,7 @@ use veni_image::Sanitised;
 use veni_data::expand::network::Estimate;
 use veni_data::prepare::{Examined, Fingerprint, Split, capture};
 
-use super::expand::NetworkSettings;
+use super::network::NetworkSettings;
 use super::scan::Source;
 
 /// One examined file.

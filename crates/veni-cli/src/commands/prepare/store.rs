@@ -20,7 +20,7 @@ use veni_light::output::{Overwrite, write_atomic};
 use veni_image::Transfer;
 use veni_data::prepare::Expander;
 
-use super::expand::NetworkSettings;
+use super::network::NetworkSettings;
 use super::record::Record;
 use super::scan::Source;
 use crate::output::{PROBE, writable};

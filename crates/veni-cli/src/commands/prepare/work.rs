@@ -1,7 +1,6 @@
 //! Examining files, several at a time, and keeping what was learnt of each as soon as it is known.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
 use rayon::prelude::*;
@@ -9,12 +8,12 @@ use veni_light::output::Overwrite;
 use veni_image::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions};
 use veni_data::prepare::{Examined, PrepareConfig, content_hash, examine};
 
-use super::expand::NetworkSettings;
+use super::network::NetworkSettings;
 use super::record::{Facts, Fate, Record};
 use super::scan::Source;
 use super::store::Store;
 use crate::output::with_remedy;
-use crate::progress::Progress;
+use crate::progress::Bars;
 use crate::report::{Report, to_stderr};
 
 /// Files of more bytes than this are examined one at a time: their pixels fill the memory.
@@ -37,8 +36,8 @@ pub(super) fn examine_all(
     if skipped > 0 {
         report.note(format_args!("{skipped} of {} files were examined before", sources.len()));
     }
-    let progress = Mutex::new(Progress::start(report, "file", skipped as u64, sources.len() as u64));
-    let done = AtomicU64::new(skipped as u64);
+    let bars = Bars::new(report);
+    bars.begin_after(skipped as u64, "", "file", Some(sources.len() as u64));
     let store = Mutex::new(store);
     let one = |source: &&Source| -> Result<()> {
         let fate = fate(&store, source, config, network)?;
@@ -46,13 +45,13 @@ pub(super) fn examine_all(
             to_stderr(&format!("{}: {reason}\n", source.path.display()));
         }
         lock(&store).add(Record::new(source, fate))?;
-        lock(&progress).set(done.fetch_add(1, Ordering::Relaxed) + 1, String::new);
+        bars.add(1);
         Ok(())
     };
     let (large, small): (Vec<_>, Vec<_>) = todo.into_iter().partition(|s| s.bytes > LARGE);
     small.par_iter().try_for_each(one)?;
     large.iter().try_for_each(one)?;
-    progress.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner).finish();
+    bars.end();
     Ok(())
 }
 
@@ -69,7 +68,7 @@ fn fate(
     network: Option<&NetworkSettings>,
 ) -> Result<Fate> {
     let refused = |error: veni_light::Error| {
-        let text = error.to_string();
+        let text = error.with_source();
         let prefix = format!("{}: ", source.path.display());
         Fate::Refused(text.strip_prefix(&prefix).unwrap_or(&text).to_owned())
     };

@@ -7,7 +7,7 @@ use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
 
 use crate::args::ModelArgs;
-use crate::output::CUBE_FACES;
+use crate::output::{CUBE_FACES, with_remedy};
 use crate::report::Report;
 use crate::source::{self, Loaded};
 
@@ -24,7 +24,7 @@ pub(super) fn from_file(
         let latent = source::from_file(path, &loaded, report)?;
         return decode(&loaded, &latent, grid, turn);
     }
-    if veni_image::attributes(path)?.contains_key(CUBE_FACES) {
+    if veni_image::attributes(path).map_err(with_remedy)?.contains_key(CUBE_FACES) {
         bail!("{}: a cube map is no panorama; name an equirectangular image", path.display());
     }
     let image = source::panorama(path, report)?;

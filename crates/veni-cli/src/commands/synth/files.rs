@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use veni_light::Error;
-use veni_light::output::{Overwrite, refuse_existing};
+use veni_light::output::Overwrite;
 use veni_image::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions, attributes};
 use veni_light::sphere::Equirect;
 use veni_synth::Scene;
 
-use crate::output::{create_folder, writable};
+use crate::output::{create_folder, refuse_existing, writable};
 
 /// Attribute of a generated panorama: its parameters as JSON.
 const SCENE: &str = "veni:scene";

@@ -7,7 +7,7 @@ use veni_light::Error;
 use veni_light::output::existing_above;
 use veni_core::train::run::{is_free, leftovers};
 
-use super::Train;
+use super::args::Train;
 use crate::output::writable;
 
 /// What a run writes into its folder.

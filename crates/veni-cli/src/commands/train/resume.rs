@@ -5,8 +5,9 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use veni_data::Holding;
 
-use super::Train;
+use super::args::Train;
 use super::config::read;
+use super::holding::held_by;
 
 impl Train {
     /// With `--resume`: whatever else was typed must be what the run was begun with, but for where its panoramas are held.
@@ -73,11 +74,4 @@ impl Train {
             scratch: given("scratch").then_some(data.scratch).flatten(),
         })
     }
-}
-
-/// Which of the settings of holding a `--set` gives.
-pub(super) fn held_by(set: &str) -> Option<&'static str> {
-    let (key, _) = set.split_once('=')?;
-    let key = key.trim().strip_prefix("data.")?;
-    Holding::KEYS.into_iter().find(|held| *held == key)
 }

@@ -79,7 +79,7 @@ impl Checkpoint {
         let mut bytes = Vec::new();
         file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
         if bytes.len() as u64 > MAX_FILE_BYTES {
-            return Err(Error::invalid("larger than 2 GiB: no file of LPIPS weights is").in_file(path));
+            return Err(Error::too_large("larger than 2 GiB: no file of LPIPS weights is").in_file(path));
         }
         Self::from_bytes(bytes).map_err(|e| e.in_file(path))
     }

@@ -162,7 +162,7 @@ impl TrainConfig {
             if self.model.kind == ModelKind::Reni && stage.changes.contains_key("data") {
                 return refuse(
                     "an auto-decoder's latents belong to its panoramas, so that a stage cannot have other data: train \
-                     on it in a run of its own, and begin the next one with --init",
+                     on it in a run of its own, and begin the next one with that one's model (init)",
                 );
             }
         }

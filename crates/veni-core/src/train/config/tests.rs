@@ -143,7 +143,7 @@ fn stages_that_do_not_fit_are_named() {
     assert!(wrong.contains("no stage `b`"), "{wrong}");
     let mut reni = Preset::Tiny.auto_decoder(3);
     reni.stage = vec![stage("a", 200, "data.folders = ['x']")];
-    assert!(reni.check().unwrap_err().to_string().contains("--init"));
+    assert!(reni.check().unwrap_err().to_string().contains("(init)"));
     reni.stage = vec![stage("a", 200, "latents.free_exposure = true")];
     assert!(reni.check().unwrap_err().to_string().contains("free_exposure"));
     reni.stage = vec![stage("a", 200, "decoder.learning_rate.rate = 1e-5")];

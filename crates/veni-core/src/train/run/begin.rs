@@ -82,7 +82,7 @@ impl Trainer {
         let state = if path.exists() { Some(checkpoint::load(&path)?) } else { None };
         if let (None, Some(init)) = (&state, &config.init) {
             return Err(Error::invalid(format!(
-                "{}: is missing, and with it the weights that the run took from {}; begin it anew with --force",
+                "{}: is missing, and with it the weights that the run took from {}; begin the run anew",
                 path.display(),
                 init.model.display()
             )));
@@ -145,7 +145,7 @@ fn refuse_used(folder: &Path) -> Result<()> {
         return Ok(());
     }
     let folder = folder.display();
-    Err(Error::invalid(format!("{folder}: is not empty; --resume continues a run, or name a new folder")))
+    Err(Error::invalid(format!("{folder}: is not empty; continue the run in it, or name a new folder")))
 }
 
 /// Folders inside a run's.
@@ -154,7 +154,7 @@ const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
 /// The training panoramas of a stage, without those that validate the run.
 fn own_data(stage: &Stage, val: &Dataset, scratch: &Path, heard: Heard<'_>) -> Result<Dataset> {
     let name = stage.name.as_deref().unwrap_or_default();
-    let named = |e: Error| Error::invalid(format!("stage {name}: {e}"));
+    let named = |e: Error| Error::invalid(format!("stage {name}: {}", e.with_source()));
     let train =
         Splits::open_heard(&stage.config.data, stage.config.seed, scratch, heard).map_err(named)?.train;
     let file = |path: &Path| fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());

@@ -270,7 +270,7 @@ fn fitted(
     let mut latents = Vec::with_capacity(images.len());
     // a few at a time: the graph of a fit holds every activation of its images
     for images in coarse.chunks(4) {
-        let target = FitTarget::panoramas(coarse_grid(grid, factor), images);
+        let target = FitTarget::panoramas(coarse_grid(grid, factor), images)?;
         let start = vec![Latent::new(vec![[0.0; 3]; n]); images.len()];
         latents.extend(fit(decoder, &target, &start, &config.validation)?.latents);
     }

@@ -42,7 +42,7 @@ impl OnnxNetwork {
             return Err(Error::invalid("is a folder, not an ONNX file").in_file(path));
         }
         if meta.len() > MAX_BYTES {
-            return Err(Error::invalid("is larger than 2 GiB, which no ONNX file is").in_file(path));
+            return Err(Error::too_large("is larger than 2 GiB, which no ONNX file is").in_file(path));
         }
         let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();

@@ -19,7 +19,7 @@ fn images_of_the_decoder_itself_are_found_to_the_last_bits() {
     let (decoder, grid) = (decoder(), Equirect::new(16, 8));
     let images = [1, 2].map(|seed| image(&decoder, grid, seed).iter().map(|v| v + 0.5).collect::<Vec<_>>());
     let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
-    let target = FitTarget::panoramas(grid, &views);
+    let target = FitTarget::panoramas(grid, &views).unwrap();
     let run = |config: FitConfig| {
         let config = FitConfig { prior: 0.0, free_exposure: true, ..config };
         fit(&decoder, &target, &near(), &config).unwrap()
@@ -40,7 +40,7 @@ fn it_ends_where_no_direction_goes_down_with_prior_and_every_objective() {
     // no image of the decoder
     let image: Vec<f32> = (0..3 * grid.len()).map(|k| (k as f32 * 0.11).sin()).collect();
     let views = [image.as_slice()];
-    let target = FitTarget::panoramas(grid, &views);
+    let target = FitTarget::panoramas(grid, &views).unwrap();
     for objective in &objectives()[..4] {
         let config = FitConfig { objective: *objective, prior: 0.01, free_exposure: true, ..marquardt() };
         let one = FitConfig { method: Method::Adam, steps: 1, ..config };
@@ -95,7 +95,7 @@ fn auto_takes_it_for_few_vectors() {
     let (decoder, grid) = (decoder(), Equirect::new(16, 8));
     let image = image(&decoder, grid, 1);
     let views = [image.as_slice()];
-    let target = FitTarget::panoramas(grid, &views);
+    let target = FitTarget::panoramas(grid, &views).unwrap();
     let config = FitConfig { steps: 5, ..marquardt() };
     let run = |method| fit(&decoder, &target, &[latent(2)], &FitConfig { method, ..config }).unwrap();
     assert_eq!(run(Method::Auto), run(Method::LevenbergMarquardt));

@@ -43,7 +43,7 @@ fn images_of_the_decoder_itself_are_found_again() {
     let (decoder, grid) = (decoder(), Equirect::new(16, 8));
     let images = [1, 2].map(|seed| image(&decoder, grid, seed));
     let views: Vec<_> = images.iter().map(Vec::as_slice).collect();
-    let target = FitTarget::panoramas(grid, &views);
+    let target = FitTarget::panoramas(grid, &views).unwrap();
     let config = FitConfig { prior: 0.0, ..FitConfig::light() };
     let moved = |seed| Latent::new(latent(seed).vectors.into_iter().map(|v| v.map(|c| c + 0.03)).collect());
     let start = [1, 2].map(moved);
@@ -63,7 +63,7 @@ fn a_mask_hides_what_it_covers_and_a_free_scale_finds_the_exposure() {
     }
     let run = |image: &[f32], free_exposure| {
         let (images, masks) = ([image], [mask.as_slice()]);
-        let target = FitTarget { masks: Some(&masks), ..FitTarget::panoramas(grid, &images) };
+        let target = FitTarget::panoramas(grid, &images).unwrap().masked(&masks).unwrap();
         let config = FitConfig { steps: 60, prior: 0.0, free_exposure, ..FitConfig::light() };
         fit(&decoder, &target, &[latent(1)], &config).unwrap()
     };
@@ -79,9 +79,14 @@ fn a_mask_hides_what_it_covers_and_a_free_scale_finds_the_exposure() {
 fn what_does_not_fit_together_is_refused() {
     let (decoder, grid) = (decoder(), Equirect::new(4, 2));
     let image = vec![0.0; 24];
-    let message = |images: &[&[f32]], masks, start: &[Latent]| {
-        let target = FitTarget { masks, ..FitTarget::panoramas(grid, images) };
-        fit(&decoder, &target, start, &FitConfig::light()).unwrap_err().to_string()
+    let message = |images: &[&[f32]], masks: Option<&[&[f32]]>, start: &[Latent]| {
+        let target = FitTarget::panoramas(grid, images);
+        let target = target.and_then(|target| match masks {
+            Some(masks) => target.masked(masks),
+            None => Ok(target),
+        });
+        let result = target.and_then(|target| fit(&decoder, &target, start, &FitConfig::light()));
+        result.unwrap_err().to_string()
     };
     assert!(message(&[], None, &[]).contains("0 images"));
     assert!(message(&[&image], None, &[]).contains("0 latents"));
@@ -102,9 +107,9 @@ fn light_deals_out_its_share_of_the_weight() {
     image[9..12].fill(f32::INFINITY);
     let mask: Vec<f32> = (0..8).map(|p| f32::from(p != 3)).collect();
     let (images, masks) = ([image.as_slice()], [mask.as_slice()]);
-    let target = FitTarget { masks: Some(&masks), ..FitTarget::panoramas(grid, &images) };
+    let target = FitTarget::panoramas(grid, &images).unwrap().masked(&masks).unwrap();
     let loss = |share: f64, which: &dyn Fn(usize) -> bool| -> f64 {
-        let loss = PixelLoss::new(Objective::Energy { share }, &target, 0, &target.areas());
+        let loss = PixelLoss::new(Objective::Energy { share }, target.images()[0], &target.areas());
         let off = |p: usize| [0, 1, 2].map(|c| f64::from(image[3 * p + c]) + 1e-3);
         (0..8).filter(|p| which(*p)).map(|p| 1e6 * loss.at(p, off(p)).loss).sum()
     };
@@ -116,7 +121,7 @@ fn light_deals_out_its_share_of_the_weight() {
         assert_eq!(loss(share, &|p| p == 3), 0.0);
     }
     // what is far off is a line: twice as far costs twice as much, not four times
-    let all_light = PixelLoss::new(Objective::Energy { share: 1.0 }, &target, 0, &target.areas());
+    let all_light = PixelLoss::new(Objective::Energy { share: 1.0 }, target.images()[0], &target.areas());
     let cost = |e: f64| all_light.at(0, [e; 3]).loss;
     assert!((cost(200.0) / cost(100.0) - 2.0).abs() < 0.02);
 }
@@ -127,9 +132,9 @@ fn slopes_are_those_of_the_pixel_losses() {
     let image: Vec<f32> = (0..24).map(|k| (k as f32 * 0.7).sin()).collect();
     let clipped: Vec<bool> = (0..24).map(|k| k % 3 == 0).collect();
     let (images, clips) = ([image.as_slice()], [clipped.as_slice()]);
-    let target = FitTarget { clipped: Some(&clips), ..FitTarget::panoramas(grid, &images) };
+    let target = FitTarget::panoramas(grid, &images).unwrap().clipped(&clips).unwrap();
     for objective in &objectives() {
-        let loss = PixelLoss::new(*objective, &target, 0, &target.areas());
+        let loss = PixelLoss::new(*objective, target.images()[0], &target.areas());
         for pixel in 0..8 {
             let p = [0, 1, 2].map(|c| (1.3 * (3 * pixel + c) as f64).cos());
             let PixelValue { slope: slopes, curvature, .. } = loss.at(pixel, p);
@@ -171,7 +176,11 @@ fn clipped_values_ask_only_for_at_least_as_much() {
     assert!(clipped.iter().filter(|c| **c).count() > 20, "nothing to clip");
     let loss = |clipped: Option<&[&[bool]]>| {
         let images = [cut.as_slice()];
-        let target = FitTarget { clipped, ..FitTarget::panoramas(grid, &images) };
+        let target = FitTarget::panoramas(grid, &images).unwrap();
+        let target = match clipped {
+            Some(clipped) => target.clipped(clipped).unwrap(),
+            None => target,
+        };
         let config = FitConfig { steps: 1, prior: 0.0, ..FitConfig::light() };
         fit(&decoder, &target, &[latent(1)], &config).unwrap().losses[0]
     };
@@ -184,7 +193,7 @@ fn a_fit_ends_on_a_plateau_and_says_what_it_reached() {
     let (decoder, grid) = (decoder(), Equirect::new(16, 8));
     let image = image(&decoder, grid, 1);
     let images = [image.as_slice()];
-    let target = FitTarget::panoramas(grid, &images);
+    let target = FitTarget::panoramas(grid, &images).unwrap();
     let plateau = Some(Plateau { patience: 20, improvement: 1e-2 });
     let config = FitConfig { steps: 5000, plateau, prior: 0.0, ..FitConfig::light() };
     let mut calls = 0;
@@ -202,7 +211,7 @@ fn of_several_starts_the_best_is_kept_and_the_seed_decides() {
     let (decoder, grid) = (decoder(), Equirect::new(16, 8));
     let image = image(&decoder, grid, 1);
     let images = [image.as_slice()];
-    let target = FitTarget::panoramas(grid, &images);
+    let target = FitTarget::panoramas(grid, &images).unwrap();
     let prior = veni_light::latent::Prior::standard(3);
     let starts = random_starts(&prior, 0.5, 3, 7);
     assert_eq!(starts, random_starts(&prior, 0.5, 3, 7));
@@ -220,7 +229,7 @@ fn settings_that_make_no_sense_are_refused_by_name() {
     let (decoder, grid) = (decoder(), Equirect::new(16, 8));
     let image = image(&decoder, grid, 1);
     let images = [image.as_slice()];
-    let whole = FitTarget::panoramas(grid, &images);
+    let whole = FitTarget::panoramas(grid, &images).unwrap();
     let message = |target: &FitTarget<'_>, config: FitConfig| {
         fit(&decoder, target, &[latent(1)], &config).unwrap_err().to_string()
     };
@@ -233,7 +242,9 @@ fn settings_that_make_no_sense_are_refused_by_name() {
     let mut hole = image.clone();
     hole[7] = f32::NAN;
     let hole = [hole.as_slice()];
-    assert!(message(&FitTarget::panoramas(grid, &hole), light).contains("pixel 2 is NaN"));
+    assert!(message(&FitTarget::panoramas(grid, &hole).unwrap(), light).contains("pixel 2 is NaN"));
     let areas = vec![0.0; grid.len()];
-    assert!(message(&FitTarget { areas: Some(&areas), ..whole }, light).contains("areas"));
+    let refused = whole.clone().in_directions(grid.directions(), Some(&areas)).unwrap_err().to_string();
+    assert!(refused.contains("areas"), "{refused}");
+    assert!(whole.in_directions(vec![[0.0; 3]; 7], None).unwrap_err().to_string().contains("7 directions"));
 }

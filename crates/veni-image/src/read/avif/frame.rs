@@ -55,14 +55,14 @@ impl Frame {
         }
     }
 
-    /// The share of samples below half of their range.
-    pub(super) fn share_below_half(&self) -> f64 {
+    /// Samples from 0 to 1, row-major: those of an alpha channel.
+    pub(super) fn opacity(&self) -> Vec<f32> {
         let plane = self.picture.plane(PlanarImageComponent::Y);
         let luma = self.samples(&plane, [1, 1]);
         let scale = Scale::new(self.bits, self.coding().full_range);
         let [width, height] = self.size();
-        let below = |y: usize| (0..width).filter(|x| scale.luma(luma.at(*x, y)) < 0.5).count();
-        (0..height).map(below).sum::<usize>() as f64 / (width * height) as f64
+        let row = |y: usize| (0..width).map(move |x| (x, y));
+        (0..height).flat_map(row).map(|(x, y)| scale.luma(luma.at(x, y)).clamp(0.0, 1.0) as f32).collect()
     }
 
     /// Display values, row-major.

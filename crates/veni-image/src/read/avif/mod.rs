@@ -47,7 +47,7 @@ pub(super) fn read(mut file: impl Read, path: &Path, options: &ReadOptions) -> R
         if alpha.size() != size {
             return Err(Error::invalid("damaged AVIF file: its alpha is not as large as the picture"));
         }
-        panorama.transparent = alpha.share_below_half();
+        panorama.alpha = Some(alpha.opacity()).filter(|alpha| alpha.iter().any(|a| *a < 1.0));
     }
     Ok(panorama)
 }

@@ -15,7 +15,7 @@ pub(super) fn open(number: usize) -> Result<Opened> {
         ),
         count => Error::unsupported(format!(
             "device cuda: there is no number {number}: nvidia-smi -L lists {count}, counted from 0 \
-             (CUDA_VISIBLE_DEVICES hides others); name those with --devices"
+             (CUDA_VISIBLE_DEVICES hides others); name those"
         )),
     })?;
     let name = device.identity().map_or_else(|| format!("CUDA device {number}"), |identity| identity.name);

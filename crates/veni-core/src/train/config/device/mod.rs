@@ -164,6 +164,6 @@ fn processor(device: Device, name: &str) -> Opened {
 #[cfg(not(all(feature = "ndarray", feature = "wgpu", feature = "cuda")))]
 fn not_compiled_in(name: &str) -> crate::Error {
     crate::Error::unsupported(format!(
-        "device {name} is not compiled in: build with --features {name}, or take device flex"
+        "device {name} is not compiled in: build with the feature {name}, or take device flex"
     ))
 }

@@ -42,7 +42,7 @@ fn a_device_that_is_missing_names_the_remedy() {
     ];
     for (kind, name, _) in missing.into_iter().filter(|(.., compiled)| !compiled) {
         let message = kind.open().unwrap_err().to_string();
-        for word in [name, "not compiled in", "--features"] {
+        for word in [name, "not compiled in", "the feature"] {
             assert!(message.contains(word), "{word} is missing in: {message}");
         }
     }

@@ -32,8 +32,8 @@ pub(super) fn open(number: Option<usize>) -> Result<Opened> {
     });
     found.clone().map_err(|cause| match number {
         Some(number) => Error::unsupported(format!(
-            "device wgpu: there is no graphics card number {number}, counted from 0 ({cause}): veni-cli inspect --devices \
-             lists adapters; name cards among them with --devices, or leave it out"
+            "device wgpu: there is no graphics card number {number}, counted from 0 ({cause}): \
+             name one that there is, or none"
         )),
         None => Error::unsupported(format!(
             "device wgpu: there is no usable graphics adapter ({cause}): install a Vulkan driver (Mesa's, package \

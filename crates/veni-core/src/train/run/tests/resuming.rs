@@ -66,7 +66,7 @@ fn a_used_folder_and_a_damaged_checkpoint_are_refused() {
     let out = folder.path().join("run");
     complete(&mut Trainer::create(&out, config.clone(), "test").unwrap());
     let message = Trainer::create(&out, config.clone(), "test").unwrap_err().to_string();
-    assert!(message.contains("not empty") && message.contains("--resume"), "{message}");
+    assert!(message.contains("not empty") && message.contains("continue the run"), "{message}");
     let state = out.join("checkpoint/state.safetensors");
     let bytes = fs::read(&state).unwrap();
     fs::write(&state, &bytes[..bytes.len() / 2]).unwrap();

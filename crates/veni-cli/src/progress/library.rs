@@ -1,0 +1,66 @@
+//! What the library tells of its work.
+
+use veni_eval::protocol::Watch;
+use veni_image::metrics::MeanScores;
+use veni_core::train::progress::{Progress, StepReport, ValidationReport};
+
+use super::Bars;
+
+/// What reading panoramas is called.
+const LOADING: &str = "loading";
+/// Threads overtake one another by fewer panoramas than this; the next set falls back by more.
+const OVERTAKEN: u64 = 64;
+
+impl Bars {
+    /// `done` of `all` panoramas are there; where they are read in several sets, each has a bar.
+    pub(crate) fn loading(&self, done: usize, all: usize) {
+        let (done, all) = (done as u64, all as u64);
+        let is_same = self.current().as_ref().is_some_and(|work| {
+            work.what == LOADING && work.total == Some(all) && done + OVERTAKEN > work.done
+        });
+        if !is_same {
+            self.begin(LOADING, "panorama", Some(all));
+        }
+        self.advance(done, "");
+    }
+}
+
+impl Watch for Bars {
+    fn begin(&self, unit: &'static str, task: &str, done: usize, total: usize) {
+        self.end();
+        if done > 0 {
+            self.note(&format!("{task}: {done} of {total} {unit}s kept from an earlier run"));
+        }
+        if done < total {
+            self.begin_after(done as u64, task, unit, Some(total as u64));
+        }
+    }
+
+    fn advance(&self, units: usize) {
+        self.add(units as u64);
+    }
+}
+
+impl Progress for &Bars {
+    fn start(&mut self, done: u64, total: u64) {
+        self.begin_after(done, "", "step", Some(total));
+    }
+
+    fn step(&mut self, step: &StepReport, _remaining: f64) {
+        let parts: Vec<_> = step.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
+        let stage = step.stage.as_ref().map(|stage| format!("{stage}, ")).unwrap_or_default();
+        Bars::advance(self, step.step, &format!("{stage}loss {:.4} ({})", step.loss, parts.join(", ")));
+    }
+
+    fn validation(&mut self, report: &ValidationReport) {
+        let psnr = |name, scores: &Option<_>| {
+            scores.as_ref().map(|s: &MeanScores| format!("{name} {:.2} dB", s.ldr_psnr))
+        };
+        let scores: Vec<_> =
+            [psnr("val", &report.val), psnr("train", &report.train)].into_iter().flatten().collect();
+        if !scores.is_empty() {
+            let best = if report.best { " (best so far)" } else { "" };
+            self.note(&format!("step {}: LDR PSNR {}{best}", report.step, scores.join(", ")));
+        }
+    }
+}

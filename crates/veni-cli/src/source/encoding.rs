@@ -1,0 +1,73 @@
+//! A panorama through a model's encoder.
+
+use std::path::Path;
+
+use anyhow::{Result, bail};
+use veni_data::Item;
+use veni_image::metrics::{Alignment, Scores, scores};
+use veni_light::field::Field;
+use veni_light::latent::Latent;
+use veni_image::Panorama;
+use veni_light::sphere::Equirect;
+use veni_core::train::config::DeviceKind;
+use veni_core::vae::Veni;
+
+use super::image::panorama;
+use super::model::Loaded;
+use crate::latent_files::source_of;
+use crate::report::Report;
+
+/// The resolution at which a panorama is encoded and scored: that of the training data of the article.
+const GRID: [usize; 2] = [128, 64];
+
+/// A panorama's latent and how good it is.
+pub(crate) struct Encoded {
+    pub(crate) latent: Latent,
+    pub(crate) scores: Scores,
+    pub(crate) panorama: Panorama,
+    pub(crate) field: Field,
+}
+
+/// A model's encoder, ready.
+pub(crate) struct Encoding<'a> {
+    loaded: &'a Loaded,
+    veni: Veni,
+}
+
+impl<'a> Encoding<'a> {
+    pub(crate) fn new(loaded: &'a Loaded) -> Result<Self> {
+        if !loaded.model.has_encoder() {
+            bail!(
+                "{}: this model has no encoder, it decodes only; name one that has with --model FILE",
+                loaded.name
+            );
+        }
+        let veni = Veni::from_model(&loaded.model, &DeviceKind::Flex.device()?)
+            .map_err(|e| e.in_file(&loaded.name))?;
+        Ok(Self { loaded, veni })
+    }
+
+    /// Reads, encodes, and decodes again to compare.
+    pub(crate) fn encode_file(&self, path: &Path, report: Report) -> Result<Encoded> {
+        let panorama = panorama(path, report)?;
+        let grid = Equirect::new(GRID[0], GRID[1]);
+        let item = Item::new(path, &panorama, grid);
+        let encoded =
+            self.veni.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
+        let vectors = encoded.into_iter().next().map(|e| e.vectors).unwrap_or_default();
+        let latent = Latent {
+            vectors,
+            log_exposure: item.log_exposure,
+            model: Some(self.loaded.model.hash()),
+            source: Some(source_of(path)),
+        };
+        let decoder = self.loaded.model.decoder().map_err(|e| e.in_file(&self.loaded.name))?;
+        let field = decoder.condition(&latent).map_err(|e| e.in_file(path))?;
+        let mut decoded = vec![[0.0; 3]; grid.len()];
+        field.log_radiance_batch(&grid.directions(), &mut decoded);
+        let prediction: Vec<f32> = decoded.as_flattened().iter().map(|v| v - item.log_exposure).collect();
+        // the article's protocol, as in training
+        let scores = scores(&prediction, &item.log_radiance, grid.height, grid.width, Alignment::LogFactor);
+        Ok(Encoded { latent, scores, panorama, field })
+    }
+}

@@ -1,0 +1,125 @@
+//! The latent that a file or a seed names, and the model that it belongs to.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, bail};
+use veni_light::Error;
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+
+use super::model::{Loaded, embedded, model};
+use crate::args::ModelArgs;
+use crate::output::{CUBE_FACES, LATENT, with_remedy};
+use crate::report::Report;
+
+/// The model of `--model`; where none is named, the one inside the program that the first latent in `files` belongs to.
+pub(crate) fn model_of<'a>(args: &ModelArgs, files: impl IntoIterator<Item = &'a Path>) -> Result<Loaded> {
+    if args.model.is_none() {
+        // what cannot be read is reported when it is its turn
+        let latent = files.into_iter().find_map(|path| stored(path).ok().flatten());
+        if let Some(numbers) = latent.and_then(|latent| inside(&latent)) {
+            return embedded(numbers);
+        }
+    }
+    model(args)
+}
+
+/// The latent that `--seed` names: drawn from the model's prior.
+pub(crate) fn seeded(model: &Model, seed: u64) -> Latent {
+    Latent { model: Some(model.hash()), ..Latent::from_seed(&model.prior(), seed) }
+}
+
+/// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder.
+pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
+    let model = &loaded.model;
+    let mut latent = match stored(path)? {
+        Some(latent) => latent,
+        None => encode(path, loaded, report)?,
+    };
+    check(&latent, loaded).with_context(|| path.display().to_string())?;
+    if latent.model.is_none() {
+        report.note(format_args!(
+            "{}: does not say which model it belongs to; taken for this one",
+            path.display()
+        ));
+        latent.model = Some(model.hash());
+    }
+    Ok(latent)
+}
+
+/// The latent in a latent's file or in a baked image; None in a panorama without.
+fn stored(path: &Path) -> Result<Option<Latent>> {
+    if is_latent(path)? {
+        return Ok(Some(Latent::load(path)?));
+    }
+    let attributes = veni_image::attributes(path).map_err(with_remedy)?;
+    match attributes.get(LATENT) {
+        Some(text) => Latent::from_json(text)
+            .map(Some)
+            .map_err(|e| anyhow!("{}: attribute {LATENT}: {e}", path.display())),
+        None if attributes.contains_key(CUBE_FACES) => {
+            bail!("{}: a cube map cannot be encoded; name an equirectangular panorama", path.display())
+        }
+        None => Ok(None),
+    }
+}
+
+/// A latent means something only to the decoder that it was made for.
+fn check(latent: &Latent, Loaded { model, name }: &Loaded) -> Result<()> {
+    let (n, expected) = (latent.vectors.len(), model.latent_vectors());
+    if n != expected {
+        bail!("a latent of {n} vectors, but {name} has {expected}: name {}", owner(latent));
+    }
+    match &latent.model {
+        Some(hash) if *hash != model.hash() => {
+            bail!("a latent of model {hash}, but {name} is {}: name {}", model.hash(), owner(latent))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The model that a latent belongs to, and how to name it.
+fn owner(latent: &Latent) -> String {
+    match inside(latent) {
+        Some(numbers) => format!("its own model, which is inside this program, with --model {numbers}"),
+        None => "the latent's own model with --model FILE".to_owned(),
+    }
+}
+
+/// The size of the model inside this program that a latent says it belongs to.
+#[cfg(feature = "pretrained")]
+fn inside(latent: &Latent) -> Option<usize> {
+    let numbers = 3 * latent.vectors.len();
+    Model::pretrained_of(numbers).filter(|model| Some(model.hash()) == latent.model).map(|_| numbers)
+}
+
+#[cfg(not(feature = "pretrained"))]
+fn inside(_: &Latent) -> Option<usize> {
+    None
+}
+
+#[cfg(feature = "learn")]
+fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
+    report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
+    super::encoding::Encoding::new(loaded)?.encode_file(path, report).map(|e| e.latent)
+}
+
+#[cfg(not(feature = "learn"))]
+fn encode(path: &Path, _: &Loaded, _: Report) -> Result<Latent> {
+    bail!(
+        "{}: no latent inside, and this build cannot encode panoramas (it lacks the feature `learn`)",
+        path.display()
+    )
+}
+
+/// Whether a file is a latent, and not an image: JSON is a latent; everything else is left to the image readers, which say what
+/// they do not read.
+pub(crate) fn is_latent(path: &Path) -> Result<bool> {
+    let mut start = Vec::new();
+    let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+    file.take(64).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
+    let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    Ok(named || start.trim_ascii_start().starts_with(b"{"))
+}
