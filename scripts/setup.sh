@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Installs what the tests need beyond Rust. Debian and Ubuntu are served; elsewhere it says what to install.
+#   scripts/setup.sh [--targets TARGET…]    also the standard library of other targets (.ci/run)
 set -euo pipefail
 
 # A C compiler links Rust programs; criterion and the command line need nothing else.
@@ -33,4 +34,18 @@ fi
 if ! command -v cargo >/dev/null; then
     echo "setup: Rust is missing: https://rustup.rs (veni needs $(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml) or newer)" >&2
     exit 1
+fi
+
+if [[ ${1:-} == --targets && ${VENI_SKIP_TARGETS:-0} != 1 ]]; then
+    for target in "${@:2}"; do
+        [[ ! -d $(rustc --print target-libdir --target "$target") ]] || continue
+        if command -v rustup >/dev/null; then
+            rustup target add "$target"
+        else
+            echo "setup: this Rust has no standard library for $target and no rustup to add it: install it with the package" \
+                "manager that Rust came from (Debian: libstd-rust-dev-wasm32 and the like) or take Rust from" \
+                "https://rustup.rs, or set VENI_SKIP_TARGETS=1" >&2
+            exit 1
+        fi
+    done
 fi

@@ -1,8 +1,15 @@
 #!/usr/bin/env bash
-# Runs every test, with the one build profile of the project. Extra arguments go to cargo test.
+# Runs every test, with the one build profile of the project, but those that train on a graphics device (.ci/run).
+# Arguments, if any, go to cargo test and choose instead: scripts/test.sh -p veni-light --lib sphere
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/setup.sh
-# ndarray: the golden numbers run on both CPU devices. wgpu: training runs on the graphics device too.
-cargo test --release --workspace --features veni/gpu,veni/ndarray,veni/wgpu,veni-cli/ndarray,veni-cli/wgpu "$@"
+# gpu: the golden fields are computed by the GPU decoder too. ndarray: the golden numbers run on both CPU devices.
+test=(cargo test --release --workspace --features "veni/gpu,veni/ndarray,veni-cli/ndarray")
+if (($#)); then
+    exec "${test[@]}" "$@"
+fi
+# named one by one: without names, cargo would link every example too, with burn in most of them
+"${test[@]}" --lib --bins --tests
+"${test[@]}" --doc
 scripts/check-worlds.sh

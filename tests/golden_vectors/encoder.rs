@@ -32,7 +32,7 @@ pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
 impl Official {
     /// Our encoder with their weights.
     pub(crate) fn build(&self, case: &Case, device: &Device) -> Encoder {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(0);
         let encoder = Encoder::new(&self.config, self.latent_vectors, &mut rng, device);
         self.bindings.load(case, encoder.unwrap_or_else(|e| panic!("{e}")))
     }

@@ -219,7 +219,7 @@ pub(crate) fn form(case: &Case) -> VnReluForm {
 /// The authors' decoder with its weights, from `case` (parameters under `prefix` in front of each key).
 pub(crate) fn build(case: &Case, prefix: &str, device: &Device) -> Decoder {
     let sizes = Sizes::of(case);
-    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0);
+    let mut rng = chacha20::ChaCha8Rng::seed_from_u64(0);
     let decoder = Decoder::new(&sizes.config, sizes.n, &mut rng, device);
     let mut ours = weights::read(&decoder, "");
     for binding in sizes.bindings().0 {

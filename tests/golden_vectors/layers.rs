@@ -8,7 +8,7 @@ use crate::{Outcome, Outcome::Compared, Outcome::Skipped};
 use burn::module::Module;
 use burn::tensor::{Bool, Device, Tensor, TensorData};
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
+use chacha20::ChaCha8Rng;
 use veni::model::{VectorLayer, VnReluForm};
 use veni::nn::{
     So2LinearConfig, So2Relu, VectorAttentionConfig, VectorFeedForwardConfig, VectorTransformerConfig,

@@ -4,7 +4,7 @@
 use burn::tensor::{Device, Tensor, TensorData};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use chacha20::ChaCha8Rng;
 use std::hint::black_box;
 use veni_light::model::{DecoderConfig, EncoderConfig};
 use veni_light::sphere::Equirect;

@@ -3,8 +3,8 @@
 //! A stream is ChaCha8 keyed by (seed, purpose, step, slot). Nothing has to be saved to continue a run, and
 //! the order in which threads ask changes nothing.
 
+use chacha20::ChaCha8Rng;
 use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// What a stream of random numbers is for; part of its key, so that streams never overlap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Draws for scenes: streams named by (seed, index, what for), as everywhere in veni.
 
 use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use chacha20::ChaCha8Rng;
 
 /// What a stream of one scene is for.
 #[derive(Clone, Copy, Debug)]

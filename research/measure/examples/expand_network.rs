@@ -64,7 +64,7 @@ fn sky(grid: Equirect) -> LdrPanorama {
 }
 
 fn network(channels: u64, layers: u64) -> Result<Vec<u8>, Failure> {
-    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+    let mut rng = chacha20::ChaCha8Rng::seed_from_u64(1);
     let mut file = OnnxFile::image([0, 0]);
     let mut from = "x".to_owned();
     for layer in 0..layers + 2 {

@@ -40,7 +40,7 @@ pub fn normal<const D: usize>(
 mod tests {
     use super::*;
     use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
+    use chacha20::ChaCha8Rng;
 
     #[test]
     fn values_follow_the_seed_and_fill_the_interval() {

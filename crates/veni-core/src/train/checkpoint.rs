@@ -3,7 +3,6 @@
 //! Tensors are [`Optimiser::state`](crate::train::optimiser::Optimiser::state); everything random is named by
 //! its step, so the step count is all that is needed beside them. The metadata entry `veni-checkpoint` is JSON.
 
-use std::collections::HashMap;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -60,7 +59,7 @@ pub fn save(path: &Path, state: &Weights, info: &CheckpointInfo) -> Result<()> {
         let view = TensorView::new(Dtype::F32, values.shape.clone(), bytes);
         views.push((name.as_str(), view.map_err(|e| Error::invalid(format!("tensor {name}: {e}")))?));
     }
-    let header = HashMap::from([(KEY.to_owned(), json)]);
+    let header = [(KEY.to_owned(), json)].into_iter().collect();
     let file = safetensors::serialize(views, Some(header))
         .map_err(|e| Error::invalid(format!("checkpoint: {e}")))?;
     write_atomic(path, Overwrite::Replace, |out| {

@@ -1,6 +1,5 @@
 //! The latent table of an auto-decoder: how it is trained, and its file. MODEL (25).
 
-use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 
@@ -71,7 +70,7 @@ pub fn save(path: &Path, table: &LatentTable, train: &Dataset, model: &str) -> R
     let names: Vec<_> = train.items().iter().map(veni_data::Item::name).collect();
     // one entry: the order of several is left to chance, and runs are compared to the bit
     let about = serde_json::json!({ "panoramas": names, "model": model }).to_string();
-    let header = HashMap::from([("veni-latents".to_owned(), about)]);
+    let header = [("veni-latents".to_owned(), about)].into_iter().collect();
     let file = safetensors::serialize(views, Some(header)).map_err(|e| broken(&e))?;
     write_atomic(path, Overwrite::Replace, |out| {
         out.write_all(&file).map_err(|e| Error::io(path, "write", e))

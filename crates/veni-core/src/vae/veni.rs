@@ -51,7 +51,7 @@ impl Veni {
     /// [`Error::Invalid`] if the file has no encoder, or its tensors are not those its configuration implies.
     pub fn from_model(model: &Model, device: &Device) -> Result<Self> {
         // every weight is replaced; the generator's only part is to give them a shape
-        let mut rng: rand_chacha::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
+        let mut rng: chacha20::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
         let veni = Self::new(model.config(), &mut rng, device)?;
         let tensors = model.tensors().iter().filter(|(name, _)| !name.starts_with("prior."));
         weights::write(veni, "", &tensors.map(|(name, t)| (name.clone(), t.clone())).collect())

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use burn::tensor::Device;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
+use chacha20::ChaCha8Rng;
 
 use super::Veni;
 use veni_data::augment::{mirror, turn_columns};

@@ -160,7 +160,7 @@ mod tests {
     use crate::vae::Decoder;
     use burn::tensor::Device;
     use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
+    use chacha20::ChaCha8Rng;
 
     fn decoder(seed: u64) -> Decoder {
         let config = DecoderConfig { hidden: 8, layers: 2, heads: 2, ..DecoderConfig::default() };

@@ -11,8 +11,8 @@ mod prior;
 pub use file::MAX_LATENT_BYTES;
 pub use prior::Prior;
 
+use chacha20::ChaCha8Rng;
 use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use crate::{Error, Result};
 

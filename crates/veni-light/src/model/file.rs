@@ -1,15 +1,14 @@
 //! Reading and writing the weight file.
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
 
-use half::f16;
 use safetensors::tensor::{Dtype, SafeTensors, View};
 
-use super::{Model, Array, header};
+use super::{Array, Model, half, header};
 use crate::output::{Overwrite, write_atomic};
 use crate::{Error, Result};
 
@@ -68,7 +67,7 @@ impl Model {
         for (name, view) in file.iter() {
             let data = match view.dtype() {
                 Dtype::F32 => values(view.data(), f32::from_le_bytes),
-                Dtype::F16 => values(view.data(), |bytes| f16::from_le_bytes(bytes).to_f32()),
+                Dtype::F16 => values(view.data(), |bytes| half::to_f32(u16::from_le_bytes(bytes))),
                 other => {
                     return Err(Error::unsupported(format!(
                         "tensor {name} is stored as {other:?}; F32 or F16 is read"
@@ -105,7 +104,8 @@ impl Model {
             parts.push((name, Part { dtype, shape: &tensor.shape, bytes }));
         }
         let json = header::to_json(&self.config, &self.info)?;
-        safetensors::serialize(parts, Some(HashMap::from([("veni".to_owned(), json)])))
+        // collected: the map's type is the standard library's only where some other crate asks safetensors for it
+        safetensors::serialize(parts, Some([("veni".to_owned(), json)].into_iter().collect()))
             .map_err(|e| Error::invalid(format!("the model cannot be written: {e}")))
     }
 }
@@ -122,8 +122,8 @@ fn values<const B: usize>(bytes: &[u8], decode: impl Fn([u8; B]) -> f32) -> Vec<
 fn halves(name: &str, data: &[f32]) -> Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(2 * data.len());
     for (at, value) in data.iter().enumerate() {
-        let half = f16::from_f32(*value);
-        if !half.is_finite() {
+        let half = half::from_f32(*value);
+        if !half::to_f32(half).is_finite() {
             return Err(Error::invalid(format!(
                 "tensor {name}: value {at} is {value}, beyond half precision (65504); store f32"
             )));

@@ -11,6 +11,7 @@ mod config;
 mod decoder;
 mod file;
 mod filler;
+mod half;
 mod header;
 #[cfg(feature = "pretrained")]
 mod pretrained;
@@ -147,7 +148,7 @@ impl Model {
         for (name, tensor) in self.tensors.iter().filter(|(name, _)| name.starts_with("decoder.")) {
             sha.update(name.as_bytes());
             sha.update([0]);
-            let halves = tensor.data.iter().flat_map(|v| half::f16::from_f32(*v).to_le_bytes());
+            let halves = tensor.data.iter().flat_map(|v| half::from_f32(*v).to_le_bytes());
             sha.update(halves.collect::<Vec<u8>>());
         }
         sha.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()

@@ -6,9 +6,9 @@ use super::Model;
 const FILES: &[(usize, &[u8])] = &[
     (27, include_bytes!("../../assets/veni-27.safetensors")),
     #[cfg(feature = "pretrained-large")]
-    (147, include_bytes!("../../assets/veni-147.safetensors")),
+    (147, veni_models_147::FILE),
     #[cfg(feature = "pretrained-large")]
-    (300, include_bytes!("../../assets/veni-300.safetensors")),
+    (300, veni_models_300::FILE),
 ];
 
 impl Model {

@@ -165,7 +165,7 @@ fn other_stored_types_are_unsupported() {
     use safetensors::tensor::{Dtype, TensorView};
     let json = header::to_json(small().config(), small().info()).unwrap();
     let view = TensorView::new(Dtype::F64, vec![1], &[0; 8]).unwrap();
-    let metadata = Some(std::collections::HashMap::from([("veni".to_owned(), json)]));
+    let metadata = Some([("veni".to_owned(), json)].into_iter().collect());
     let bytes = safetensors::serialize([("decoder.output.bias", view)], metadata).unwrap();
     assert!(matches!(Model::from_bytes(&bytes), Err(Error::Unsupported(m)) if m.contains("F64")));
 }

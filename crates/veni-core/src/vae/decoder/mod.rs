@@ -78,7 +78,7 @@ impl Decoder {
     /// [`Error::Invalid`] if the model's tensors are not those its configuration implies.
     pub fn from_model(model: &Model, device: &Device) -> Result<Self> {
         // every weight is replaced; the generator's only part is to give them a shape
-        let mut rng: rand_chacha::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
+        let mut rng: chacha20::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
         let decoder = Self::new(&model.config().decoder, model.latent_vectors(), &mut rng, device);
         let tensors = model.tensors().iter().filter(|(name, _)| name.starts_with("decoder."));
         weights::write(decoder, "decoder", &tensors.map(|(name, t)| (name.clone(), t.clone())).collect())

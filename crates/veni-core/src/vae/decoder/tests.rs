@@ -4,7 +4,7 @@ use veni_light::sphere::Equirect;
 use crate::vae::weights;
 use burn::tensor::TensorData;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
+use chacha20::ChaCha8Rng;
 
 const N: usize = 4;
 const FORMS: [VnReluForm; 3] =

@@ -14,8 +14,6 @@ mod kernels;
 #[cfg(test)]
 mod tests;
 
-use half::bf16;
-
 use super::mlp::PANEL;
 
 /// Lanes of a vector, and vectors of a row, of the processors in question.
@@ -87,6 +85,16 @@ impl Pairs {
 
 /// Both rounded, the first in the lower half.
 fn pair(first: f32, second: f32) -> u32 {
-    let [first, second] = [first, second].map(|v| u32::from(bf16::from_f32(v).to_bits()));
+    let [first, second] = [first, second].map(rounded);
     first | second << 16
+}
+
+/// The upper half of the nearest number whose lower half is 0, to even at a tie.
+fn rounded(value: f32) -> u32 {
+    let bits = value.to_bits();
+    match value.is_nan() {
+        // a carry would make infinity or −0 of it
+        true => bits >> 16 | 0x40,
+        false => (bits + 0x7fff + (bits >> 16 & 1)) >> 16,
+    }
 }

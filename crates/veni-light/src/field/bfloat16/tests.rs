@@ -2,9 +2,9 @@
 //!
 //! A processor without bfloat16 has nothing to test but that it says so.
 
+use chacha20::ChaCha8Rng;
 use half::bf16;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::{Bfloat16, LANES, Pairs, Row, Wide, WidePairs};
 use crate::field::block::VECTORS;
@@ -57,6 +57,17 @@ impl Apart {
         assert!(self.coarse < 1.0, "{what}: {} of what is allowed", self.coarse);
         // the break: were the factors not rounded, or the reference's, this would be seen
         assert!(self.plain > 20.0, "{what}: only {} from sums of unrounded factors", self.plain);
+    }
+}
+
+#[test]
+fn rounding_is_that_of_the_library() {
+    // around every bfloat16: its bits in f32, the middle to the next, and the neighbours of both
+    for upper in (0..1 << 16).map(|upper: u32| upper << 16) {
+        for bits in [upper, upper + 1, upper + 0x7fff, upper + 0x8000, upper + 0x8001, upper + 0xffff] {
+            let value = f32::from_bits(bits);
+            assert_eq!(super::rounded(value), u32::from(bf16::from_f32(value).to_bits()), "{bits:08x}");
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 use super::*;
+use chacha20::ChaCha8Rng;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 /// Codes with known statistics: c₁ = r·e^{iα} turned by a random angle, c₂ = i c₁/2 + noise, z = (3, −1) ± .
 fn codes(count: usize, seed: u64) -> Vec<Latent> {
