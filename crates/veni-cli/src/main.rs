@@ -20,7 +20,6 @@ mod picture;
 mod progress;
 mod report;
 mod shard;
-mod sheet;
 mod size;
 mod skies;
 mod source;

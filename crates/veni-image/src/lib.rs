@@ -12,7 +12,7 @@
 //! | NaN, infinite, negative values | [`Panorama::sanitise`] |
 //! | other sizes, turned, mirrored | [`Panorama::resample`], [`Panorama::turn`], [`Panorama::mirror`] |
 //! | what the model works on | [`Panorama::log`], [`Panorama::mean_log_luminance`] |
-//! | to a screen | [`tonemap`] |
+//! | to a screen | [`tonemap`], [`Sheet`] |
 //! | how close two panoramas are | [`metrics`] |
 //! | EXR, `.hdr`, PNG files, whole or row by row | [`Panorama::write`], [`write_rows`] |
 
@@ -24,6 +24,7 @@ mod picture;
 mod read;
 mod resample;
 mod sanitise;
+mod sheet;
 pub mod tonemap;
 mod write;
 
@@ -39,6 +40,7 @@ pub use colour::{LUMINANCE, luminance};
 pub use picture::{Picture, read_mask};
 pub use read::{DEFAULT_MAX_PIXELS, LdrPanorama, ReadOptions, Transfer, attributes};
 pub use sanitise::{LOG_FLOOR, Sanitised, log_reference, sanitise_values};
+pub use sheet::{Sheet, write_png};
 pub use write::{HalfRange, Precision, RADIANCE_SCALE, RowSink, WriteFormat, WriteOptions, write_rows};
 
 /// Linear Rec. 709 radiance on an equirectangular grid, with the text attributes of its file.

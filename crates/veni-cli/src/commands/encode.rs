@@ -9,6 +9,7 @@ use veni_light::output::Overwrite;
 use veni_image::Panorama;
 use veni_image::tonemap::Tonemap;
 use veni_light::sphere::Equirect;
+use veni_image::Sheet;
 
 use crate::args::{Force, ModelArgs};
 use crate::latent_files::LatentFiles;
@@ -16,7 +17,6 @@ use crate::output::{self, with_remedy};
 use crate::progress::Bars;
 use crate::report::{self, Outcome, Report, to_stdout};
 use crate::shard::Shard;
-use crate::sheet::Sheet;
 use crate::source::{self, Encoded, Encoding};
 
 /// The resolution of a preview.

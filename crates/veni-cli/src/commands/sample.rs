@@ -11,13 +11,13 @@ use veni_light::output::Overwrite;
 use veni_image::Panorama;
 use veni_image::tonemap::Tonemap;
 use veni_light::sphere::Equirect;
+use veni_image::Sheet;
 
 use crate::args::{Decoding, Force};
 use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::progress::Bars;
 use crate::report::{Outcome, Report};
-use crate::sheet::Sheet;
 use crate::size::Size;
 use crate::source::{self, Loaded};
 

@@ -15,6 +15,7 @@ use veni_image::tonemap::Tonemap;
 use veni_image::{Panorama, Precision};
 use veni_light::sphere::Equirect;
 use veni_synth::{Fixed, Place, Scene, SkyKind, generate};
+use veni_image::Sheet;
 
 use crate::args::Force;
 use crate::features::{LEARN, only};
@@ -22,7 +23,6 @@ use crate::output::{self, with_remedy};
 use crate::progress::{Bars, duration};
 use crate::report::{Outcome, Report};
 use crate::shard::Shard;
-use crate::sheet::Sheet;
 use crate::size::Size;
 use files::Files;
 

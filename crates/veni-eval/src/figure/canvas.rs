@@ -7,9 +7,7 @@ use embedded_graphics::mono_font::{MonoTextStyle, iso_8859_1::FONT_6X10};
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, Point, RgbColor, Size};
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
-use image::{ImageFormat, Rgb, RgbImage};
-
-use veni_light::output::{Overwrite, write_atomic};
+use veni_light::output::Overwrite;
 use crate::{Error, Result};
 
 /// Width and height of a letter, pixels.
@@ -18,28 +16,42 @@ pub(super) const LETTER: [i32; 2] = [6, 10];
 /// An 8-bit sRGB picture that starts white.
 #[derive(Clone, Debug)]
 pub struct Canvas {
-    image: RgbImage,
+    size: [usize; 2],
+    pixels: Vec<[u8; 3]>,
 }
 
 impl Canvas {
     /// `width` × `height` white pixels.
     pub fn new(width: usize, height: usize) -> Self {
-        // figures are some thousands of pixels a side
-        Self { image: RgbImage::from_pixel(width as u32, height as u32, Rgb([255; 3])) }
+        Self { size: [width, height], pixels: vec![[255; 3]; width * height] }
     }
 
-    /// The picture.
-    pub fn image(&self) -> &RgbImage {
-        &self.image
+    /// Width and height, pixels.
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// The colour of a pixel.
+    ///
+    /// # Panics
+    /// If there is none at (x, y).
+    pub fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
+        self.pixels[y * self.size[0] + x]
+    }
+
+    /// All pixels, row-major.
+    pub fn pixels(&self) -> &[[u8; 3]] {
+        &self.pixels
     }
 
     /// Sets a pixel; one outside is left out.
     pub(super) fn set(&mut self, [x, y]: [i32; 2], colour: [u8; 3]) {
-        if let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y))
-            && x < self.image.width()
-            && y < self.image.height()
+        let [width, height] = self.size;
+        if let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y))
+            && x < width
+            && y < height
         {
-            self.image.put_pixel(x, y, Rgb(colour));
+            self.pixels[y * width + x] = colour;
         }
     }
 
@@ -63,16 +75,14 @@ impl Canvas {
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         }
-        write_atomic(path, Overwrite::Replace, |out| {
-            let written = self.image.write_to(out, ImageFormat::Png);
-            written.map_err(|e| Error::invalid(format!("{}: {e}", path.display())))
-        })
+        veni_image::write_png(path, self.size, &self.pixels, Overwrite::Replace)
     }
 }
 
 impl OriginDimensions for Canvas {
     fn size(&self) -> Size {
-        Size::new(self.image.width(), self.image.height())
+        // figures are some thousands of pixels a side
+        Size::new(self.size[0] as u32, self.size[1] as u32)
     }
 }
 

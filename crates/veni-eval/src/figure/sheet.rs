@@ -89,12 +89,12 @@ mod tests {
         let names = |n: &[&str]| n.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
         let mut sheet = Sheet::new(grid, &names(&["left", "right"]), &names(&["a sky"]));
         sheet.place(1, 0, &[[200, 10, 10]; 512]);
-        let image = sheet.canvas.image();
-        assert_eq!(image.dimensions(), (5 * 6 + 8 + 2 * 36, 20 + 20));
-        let count = |colour: [u8; 3]| image.pixels().filter(|p| p.0 == colour).count();
+        let canvas = &sheet.canvas;
+        assert_eq!(canvas.size(), [5 * 6 + 8 + 2 * 36, 20 + 20]);
+        let count = |colour: [u8; 3]| canvas.pixels().iter().filter(|p| **p == colour).count();
         assert_eq!(count([200, 10, 10]), 512);
         assert!(count([0; 3]) > 60, "titles and names are black");
-        assert_eq!(image.get_pixel(38 + 36, 20).0, [200, 10, 10]);
-        assert_eq!(image.get_pixel(38 + 10, 25).0, [255; 3]);
+        assert_eq!(canvas.pixel(38 + 36, 20), [200, 10, 10]);
+        assert_eq!(canvas.pixel(38 + 10, 25), [255; 3]);
     }
 }

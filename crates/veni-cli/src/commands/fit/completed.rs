@@ -11,8 +11,9 @@ use veni_image::{Panorama, Picture, Precision, WriteFormat, WriteOptions};
 use veni_light::sphere::{Equirect, View};
 
 use super::model::FitModel;
+use veni_image::Sheet;
+
 use crate::output::with_remedy;
-use crate::sheet::Sheet;
 use crate::size::Size;
 
 /// The default size where the picture is no panorama.

@@ -9,8 +9,9 @@ use veni_light::sphere::Equirect;
 
 use super::place::{Kept, Placed};
 use super::store::Store;
+use veni_image::Sheet;
+
 use crate::output::with_remedy;
-use crate::sheet::Sheet;
 
 /// One picture on the sheet.
 const CELL: Equirect = Equirect { width: 128, height: 64 };
