@@ -20,6 +20,7 @@
 
 #![forbid(unsafe_code)]
 
+mod adam;
 pub mod encoder;
 mod fit;
 pub mod loss;
@@ -27,10 +28,12 @@ mod observation;
 pub mod schedule;
 pub mod shade;
 
+pub use adam::Adam;
 pub use encoder::{Encoded, Encoder};
 pub use fit::{
-    Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective, PanoramaLoss,
-    Plateau, best_light, best_of, fit, fit_shaded, fit_with, from_each, matching_exposure, random_starts,
+    Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective,
+    PanoramaLoss, Plateau, best_light, best_of, fit, fit_shaded, fit_with, from_each, matching_exposure,
+    random_starts,
 };
 pub use observation::{Observation, Picture};
 pub use veni_light::{Error, Result};
