@@ -4,21 +4,22 @@ use std::sync::Arc;
 
 use burn::tensor::Device;
 
-use veni_light::field;
 use crate::fit::FitDecoder;
-use veni_light::latent::{Latent, Prior};
-use veni_light::model::{Model, ModelKind};
-use veni_light::sphere::{Equirect, Stripes};
 use crate::vae::weights;
 use crate::vae::{Decoder, Veni, veni};
 use crate::{Error, Result};
+use veni_light::digest::Digest;
+use veni_light::field;
+use veni_light::latent::{Latent, Prior};
+use veni_light::model::{Model, ModelKind};
+use veni_light::sphere::{Equirect, Stripes};
 
 /// A model and everything that the protocols ask of it. A model without an encoder (RENI++, or a stripped file) takes part
 /// wherever no encoder is needed.
 #[derive(Clone, Debug)]
 pub struct LoadedModel {
     name: String,
-    identity: String,
+    identity: Digest,
     model: Arc<Model>,
     decoder: Arc<Decoding>,
     device: Device,
@@ -70,8 +71,8 @@ impl LoadedModel {
     }
 
     /// Identity of the whole model, encoder included: 16 hexadecimal digits.
-    pub fn identity(&self) -> &str {
-        &self.identity
+    pub fn identity(&self) -> Digest {
+        self.identity
     }
 
     /// The model file's content.

@@ -6,12 +6,10 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
-use veni_image::Transfer;
 use veni_data::expand::ExpandOptions;
-use veni_data::expand::network::{
-    Network, NetworkInput, NetworkOptions, NetworkOutput, NetworkScale,
-};
+use veni_data::expand::network::{Network, NetworkInput, NetworkOptions, NetworkOutput, NetworkScale};
 use veni_data::prepare::Expander;
+use veni_image::Transfer;
 use veni_light::sphere::Equirect;
 
 use super::record::Fate;
@@ -170,7 +168,7 @@ impl Expand {
 #[cfg(feature = "onnx")]
 fn load(model: &Path) -> Result<(Arc<dyn Network>, String)> {
     let network = veni_data::expand::network::OnnxNetwork::load(model)?;
-    let digest = network.digest().to_owned();
+    let digest = network.digest().to_string();
     Ok((Arc::new(network), digest))
 }
 
