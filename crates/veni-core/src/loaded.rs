@@ -1,6 +1,7 @@
 //! A model file with its networks, ready to encode, decode and be fitted to.
 
 use std::sync::Arc;
+use veni_light::random::Stream;
 
 use burn::tensor::Device;
 
@@ -187,7 +188,7 @@ impl LoadedModel {
 
 fn decoder_alone(model: &Model, device: &Device) -> Result<Decoder> {
     // every weight is replaced; the generator's only part is to give them a shape
-    let mut rng: rand_chacha::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
+    let mut rng = Stream::from_seed(0);
     let decoder = Decoder::new(&model.config().decoder, model.latent_vectors(), &mut rng, device);
     let tensors = model.tensors().iter().filter(|(name, _)| name.starts_with("decoder."));
     weights::write(decoder, "decoder", &tensors.map(|(name, t)| (name.clone(), t.clone())).collect())

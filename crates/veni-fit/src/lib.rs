@@ -11,7 +11,7 @@
 //! ```no_run
 //! use veni_light::{model::Model, sphere::Equirect};
 //!
-//! let encoder = veni_fit::Encoder::new(&Model::load("model.safetensors".as_ref())?)?;
+//! let encoder = veni_fit::Encoder::new(&Model::load("model.safetensors")?)?;
 //! let log_radiance = vec![0.0; 3 * 128 * 64];
 //! let encoded = encoder.encode(Equirect::new(128, 64), &[&log_radiance])?;
 //! println!("{:?}", encoded[0].vectors);

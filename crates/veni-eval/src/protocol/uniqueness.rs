@@ -20,7 +20,7 @@ use veni_image::metrics::{log_error, weighted_log_error};
 use veni_light::digest::Digest;
 use veni_light::latent::Latent;
 use veni_light::model::ModelKind;
-use veni_light::random::{Purpose, normal, stream};
+use veni_light::random::{Purpose, stream};
 
 /// Both latents of a panorama.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -142,7 +142,7 @@ fn pairs<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel) -> Work<'a, Pair> {
 fn random(n: usize, seed: u64, image: &serde_json::Value, slot: u64) -> Latent {
     let step = Digest::of(image.to_string()).number();
     let mut rng = stream(seed, Purpose::Evaluation, step, slot);
-    Latent::new((0..n).map(|_| [0; 3].map(|_| normal(&mut rng) as f32)).collect())
+    Latent::new((0..n).map(|_| [0; 3].map(|_| rng.normal() as f32)).collect())
 }
 
 fn measure(

@@ -5,10 +5,9 @@
 //! vectors turn and stretch together) and mean and covariance Σ of z. A sample is c = L w, z = μ + K g, with
 //! C = L Lᴴ, Σ = K Kᵀ, w circular complex normal (E|w|² = 1) and g standard normal.
 
-use rand::Rng;
-
-use super::{Latent, normal};
+use super::Latent;
 use crate::cholesky::{self, Complex, Scalar};
+use crate::random::Stream;
 use crate::{Error, Result};
 
 /// A turn-invariant Gaussian of N latent vectors, and a normal log exposure.
@@ -98,12 +97,12 @@ impl Prior {
     }
 
     /// Draws vectors and exposure; see [`Latent::sample`].
-    pub(super) fn sample<R: Rng + ?Sized>(&self, rng: &mut R) -> Latent {
+    pub(super) fn sample(&self, rng: &mut Stream) -> Latent {
         let n = self.latent_vectors();
         let w: Vec<[f64; 2]> =
-            (0..n).map(|_| normal::pair(rng).map(|g| g * std::f64::consts::FRAC_1_SQRT_2)).collect();
-        let g: Vec<f64> = (0..n.div_ceil(2)).flat_map(|_| normal::pair(rng)).collect();
-        let [exposure, _] = normal::pair(rng);
+            (0..n).map(|_| rng.normals().map(|g| g * std::f64::consts::FRAC_1_SQRT_2)).collect();
+        let g: Vec<f64> = (0..n.div_ceil(2)).flat_map(|_| rng.normals()).collect();
+        let [exposure, _] = rng.normals();
         let vector = |i: usize| {
             let mut v = [0.0, 0.0, f64::from(self.z_mean[i])];
             for j in 0..=i {

@@ -30,11 +30,11 @@ pub use layer::{Layer, Norm};
 pub use linear::Linear;
 pub use native::Native;
 pub use tokens::{Memory, TokenLayer, Tokens};
+use veni_light::random::Stream;
 
-use veni_light::model::{Conditioning, DecoderConfig};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use rand::Rng;
+use veni_light::model::{Conditioning, DecoderConfig};
 
 /// Latent and directions to log radiance.
 #[derive(Module, Debug)]
@@ -74,7 +74,7 @@ impl Decoder {
     ///
     /// # Panics
     /// If `config` is inconsistent ([`ModelConfig::validate`](veni_light::model::ModelConfig::validate)).
-    pub fn new(config: &DecoderConfig, latent_vectors: usize, rng: &mut impl Rng, device: &Device) -> Self {
+    pub fn new(config: &DecoderConfig, latent_vectors: usize, rng: &mut Stream, device: &Device) -> Self {
         let (n, hidden, conditioning) = (latent_vectors, config.hidden, config.conditioning);
         let (directional, told) = (config.direction_inputs(n), config.condition_inputs(n));
         let condition = config.vn_channels().map(|c| Condition::new(config.vn_relu, c, rng, device));

@@ -4,7 +4,7 @@ use super::{Gaussians, dot, greedy, shape};
 use crate::baseline::target::Target;
 use crate::{Error, Result};
 use veni_fit::Adam;
-use veni_light::random::{Purpose, stream, uniform};
+use veni_light::random::{Purpose, stream};
 
 /// The widest lobe, about a constant over the sphere.
 const BLUNT: f64 = 0.05;
@@ -60,7 +60,7 @@ impl Search {
         let mut best: Option<(f64, Vec<f64>)> = None;
         for start in 0..self.starts {
             let mut rng = stream(self.seed, Purpose::Fit, 0, start);
-            let factor = || if start == 0 { 1.0 } else { 1.0 - 0.5 * uniform(&mut rng) };
+            let factor = || if start == 0 { 1.0 } else { 1.0 - 0.5 * rng.uniform() };
             let shapes = greedy::shapes(problem.target(), problem.lobes(), sharpest, factor);
             let (loss, x) = self.descend(problem, problem.start(&shapes), sharpest);
             if loss.is_finite() && best.as_ref().is_none_or(|(least, _)| loss < *least) {
