@@ -18,7 +18,7 @@ mod warp;
 pub use combine::{join, mix, recombine};
 pub use warp::{azimuth_warp, mirror, polar_warp, turn_columns};
 
-use crate::exposure::centre_exposure;
+use veni_image::exposure::centre_exposure;
 use veni_light::sphere::Equirect;
 
 /// Strengths and probabilities. The default is off: the identity.
@@ -173,7 +173,7 @@ fn add_per_channel(image: &mut [f32], gains: [f32; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exposure::log_exposure;
+    use veni_image::exposure::log_exposure;
     use veni_light::random::{Purpose, stream};
 
     pub(super) const GRID: Equirect = Equirect { width: 16, height: 8 };
