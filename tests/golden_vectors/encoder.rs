@@ -8,7 +8,7 @@ use crate::case::{Case, Data};
 use crate::official::{Official, line_directions};
 use crate::{Outcome, Outcome::Compared, Outcome::Skipped};
 use burn::tensor::{Device, Gradients, Tensor};
-use rand::SeedableRng;
+use veni::random::Stream;
 use veni::vae::Encoder;
 use veni::vae::weights::Weights;
 
@@ -32,7 +32,7 @@ pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
 impl Official {
     /// Our encoder with their weights.
     pub(crate) fn build(&self, case: &Case, device: &Device) -> Encoder {
-        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(0);
+        let mut rng = Stream::from_seed(0);
         let encoder = Encoder::new(&self.config, self.latent_vectors, &mut rng, device);
         self.bindings.load(case, encoder.unwrap_or_else(|e| panic!("{e}")))
     }

@@ -6,8 +6,8 @@
 use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared, Outcome::Skipped};
 use burn::tensor::{Device, Gradients, Tensor, activation};
-use rand::SeedableRng;
 use veni::model::{Conditioning, DecoderConfig, Encoding, Equivariance, Invariance, OutputForm, VnReluForm};
+use veni::random::Stream;
 use veni::sphere::Equirect;
 use veni::sphere::reference::decoder_directions;
 use veni::vae::decoder::{Decoder, reni_2022_inputs, rotate};
@@ -219,7 +219,7 @@ pub(crate) fn form(case: &Case) -> VnReluForm {
 /// The authors' decoder with its weights, from `case` (parameters under `prefix` in front of each key).
 pub(crate) fn build(case: &Case, prefix: &str, device: &Device) -> Decoder {
     let sizes = Sizes::of(case);
-    let mut rng = chacha20::ChaCha8Rng::seed_from_u64(0);
+    let mut rng = Stream::from_seed(0);
     let decoder = Decoder::new(&sizes.config, sizes.n, &mut rng, device);
     let mut ours = weights::read(&decoder, "");
     for binding in sizes.bindings().0 {

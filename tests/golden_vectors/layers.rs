@@ -7,13 +7,12 @@ use crate::vectors::{feature, official};
 use crate::{Outcome, Outcome::Compared, Outcome::Skipped};
 use burn::module::Module;
 use burn::tensor::{Bool, Device, Tensor, TensorData};
-use rand::SeedableRng;
-use chacha20::ChaCha8Rng;
 use veni::model::{VectorLayer, VnReluForm};
 use veni::nn::{
     So2LinearConfig, So2Relu, VectorAttentionConfig, VectorFeedForwardConfig, VectorTransformerConfig,
     VnInvariantConfig, VnLayerNormConfig, VnLinearConfig, VnReluConfig,
 };
+use veni::random::Stream;
 
 /// See [`Family`](crate::Family).
 pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
@@ -40,8 +39,8 @@ pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
     Some(Compared)
 }
 
-fn rng() -> ChaCha8Rng {
-    ChaCha8Rng::seed_from_u64(0)
+fn rng() -> Stream {
+    Stream::from_seed(0)
 }
 
 fn size(case: &Case, key: &str) -> usize {

@@ -3,13 +3,12 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use rand::{Rng, SeedableRng};
-use chacha20::ChaCha8Rng;
 use std::hint::black_box;
-use veni_light::model::{DecoderConfig, EncoderConfig};
-use veni_light::sphere::Equirect;
 use veni_core::train::loss::{Loss, LossConfig};
 use veni_core::vae::{Decoder, Encoder};
+use veni_light::model::{DecoderConfig, EncoderConfig};
+use veni_light::random::Stream;
+use veni_light::sphere::Equirect;
 
 /// The paper's encoder, and one of 1.9 M parameters.
 fn sizes() -> [(&'static str, EncoderConfig); 2] {
@@ -27,7 +26,7 @@ fn sizes() -> [(&'static str, EncoderConfig); 2] {
 /// Directions and log radiance of one panorama; what they are does not change the time.
 fn panorama(config: &EncoderConfig, device: &Device) -> (Tensor<3>, Tensor<4>) {
     let shape = [1, config.stripes, config.samples.expect("stripes"), 3];
-    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let mut rng = Stream::from_seed(2);
     let mut draw = || {
         let values =
             (0..shape.iter().product::<usize>()).map(|_| rng.next_u32() as f32 / u32::MAX as f32 - 0.5);
@@ -42,8 +41,7 @@ fn encoder_forward(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("encode");
     group.sample_size(20);
     for (name, config) in sizes() {
-        let encoder =
-            Encoder::new(&config, 9, &mut ChaCha8Rng::seed_from_u64(1), &device).expect("a valid size");
+        let encoder = Encoder::new(&config, 9, &mut Stream::from_seed(1), &device).expect("a valid size");
         let (directions, radiance) = panorama(&config, &device);
         let folded = encoder.clone().fold();
         group.bench_function(format!("{name}, folded"), |b| {
@@ -65,8 +63,7 @@ fn encoder_gradient(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("encoder gradient, 4 images");
     group.sample_size(10);
     for (name, config) in sizes() {
-        let encoder =
-            Encoder::new(&config, 9, &mut ChaCha8Rng::seed_from_u64(1), &device).expect("a valid size");
+        let encoder = Encoder::new(&config, 9, &mut Stream::from_seed(1), &device).expect("a valid size");
         let (directions, radiance) = panorama(&config, &device);
         let radiance = radiance.repeat_dim(0, 4);
         group.bench_function(name, |b| {
@@ -91,7 +88,7 @@ fn decoder_gradient(criterion: &mut Criterion) {
     let directions = Tensor::<2>::from_data(directions, &device);
     for n in [9, 100] {
         let config = DecoderConfig::default();
-        let decoder = Decoder::new(&config, n, &mut ChaCha8Rng::seed_from_u64(1), &device);
+        let decoder = Decoder::new(&config, n, &mut Stream::from_seed(1), &device);
         let values: Vec<f32> = (0..4 * n * 3).map(|i| (1.3 * i as f32).sin()).collect();
         let latent = Tensor::<3>::from_data(TensorData::new(values, [4, n, 3]), &device).require_grad();
         let (m, h) = (n + 2, config.hidden);

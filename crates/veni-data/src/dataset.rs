@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::exposure::centre_exposure;
-use crate::pixels::Pixels;
-use veni_image::Panorama;
 use crate::parallel::parallel;
-use veni_light::sphere::Equirect;
+use crate::pixels::Pixels;
 use crate::{Error, Result};
+use veni_image::Panorama;
+use veni_image::exposure::centre_exposure;
+use veni_light::sphere::Equirect;
 
 /// Hears how far reading and generating have come: panoramas that are there, and panoramas in all. Several threads
 /// tell it.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
+use veni_light::digest::Digest;
 
 use crate::prepare::capture;
 use crate::{Error, Result};
@@ -38,9 +38,9 @@ impl Fold {
     /// depend on the names alone.
     pub fn held_back(self, files: &[PathBuf]) -> Vec<bool> {
         let captures: Vec<_> = files.iter().map(|file| capture(file)).collect();
-        let mut sizes: BTreeMap<([u8; 32], &str), usize> = BTreeMap::new();
+        let mut sizes: BTreeMap<(Digest, &str), usize> = BTreeMap::new();
         for name in &captures {
-            *sizes.entry((Sha256::digest(name).into(), name)).or_default() += 1;
+            *sizes.entry((Digest::of(name), name)).or_default() += 1;
         }
         let mut filled = vec![0; self.of];
         let mut part_of = BTreeMap::new();

@@ -7,7 +7,6 @@ pub mod augment;
 pub mod coarsen;
 mod dataset;
 pub mod expand;
-pub mod exposure;
 mod fold;
 mod holding;
 pub mod parallel;

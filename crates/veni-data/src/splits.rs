@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use super::dataset::{Dataset, Heard, Item, load, panorama_files};
 use super::fold::Fold;
 use super::store::PixelStore;
-use veni_light::random::{Purpose, permutation, stream};
+use crate::{Error, Result};
+use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 use veni_synth::{Fixed, Scene, render};
-use crate::{Error, Result};
 
 /// Where panoramas come from and at which resolution they are used.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -113,7 +113,7 @@ impl Splits {
             (val, train) = fold.split(&train)?;
         }
         let take = (undecided.len() as f64 * config.val_share).round() as usize;
-        let order = permutation(&mut stream(seed, Purpose::Split, 0, 0), undecided.len());
+        let order = stream(seed, Purpose::Split, 0, 0).permutation(undecided.len());
         for (rank, index) in order.into_iter().enumerate() {
             if rank < take { &mut val } else { &mut train }.push(undecided[index].clone());
         }
@@ -259,7 +259,7 @@ mod tests {
         let folder = folder(&["train/a.exr"]);
         let set = Splits::open(&config(folder.path()), 0).unwrap().train;
         let item = &set.items()[0];
-        assert!(crate::exposure::log_exposure(set.grid(), &item.log_radiance).abs() < 1e-5);
+        assert!(veni_image::exposure::log_exposure(set.grid(), &item.log_radiance).abs() < 1e-5);
         // a mean luminance of about 0.2126·0.1 + 0.7152·1.5 + 0.0722·2
         assert!((item.log_exposure.exp() - 1.24).abs() < 0.15, "{}", item.log_exposure.exp());
     }
@@ -275,9 +275,7 @@ mod tests {
         assert_ne!(splits.train.items()[1], Splits::open(&with, 5).unwrap().train.items()[1]);
         for item in &splits.train.items()[1..] {
             assert!(item.log_radiance.iter().all(|v| v.is_finite()));
-            assert!(
-                crate::exposure::log_exposure(splits.train.grid(), &item.log_radiance).abs() < 1e-5
-            );
+            assert!(veni_image::exposure::log_exposure(splits.train.grid(), &item.log_radiance).abs() < 1e-5);
         }
         let marks = |set: &Dataset| set.items().iter().map(|item| item.generated).collect::<Vec<_>>();
         assert_eq!((marks(&splits.train), marks(&splits.val)), (vec![false, true, true, true], vec![false]));

@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use sha2::{Digest, Sha256};
+use veni_light::digest::Digest;
 
-use veni_light::output::{Overwrite, write_atomic};
 use crate::{Error, Result};
+use veni_light::output::{Overwrite, write_atomic};
 
 /// A folder of kept results.
 #[derive(Clone, Debug)]
@@ -88,16 +88,9 @@ impl Store {
     fn path(&self, key: &Key) -> PathBuf {
         let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
         let name: String = key.name.chars().map(plain).take(80).collect();
-        let hash = digest([key.decides.to_string().as_bytes()]);
+        let hash = Digest::of(key.decides.to_string());
         self.folder.join("results").join(key.protocol).join(format!("{name}-{hash}.json"))
     }
-}
-
-/// The first 8 bytes of the SHA-256 over all parts, as 16 hexadecimal digits.
-pub(crate) fn digest<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> String {
-    let mut sha = Sha256::new();
-    parts.into_iter().for_each(|part| sha.update(part));
-    sha.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@
 //! ```no_run
 //! use veni_light::{model::Model, sphere::Equirect};
 //!
-//! let encoder = veni_fit::Encoder::new(&Model::load("model.safetensors".as_ref())?)?;
+//! let encoder = veni_fit::Encoder::new(&Model::load("model.safetensors")?)?;
 //! let log_radiance = vec![0.0; 3 * 128 * 64];
 //! let encoded = encoder.encode(Equirect::new(128, 64), &[&log_radiance])?;
 //! println!("{:?}", encoded[0].vectors);
@@ -20,6 +20,7 @@
 
 #![forbid(unsafe_code)]
 
+mod adam;
 pub mod encoder;
 mod fit;
 pub mod loss;
@@ -27,10 +28,12 @@ mod observation;
 pub mod schedule;
 pub mod shade;
 
+pub use adam::Adam;
 pub use encoder::{Encoded, Encoder};
 pub use fit::{
-    Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective, PanoramaLoss,
-    Plateau, best_light, best_of, fit, fit_shaded, fit_with, from_each, matching_exposure, random_starts,
+    Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective,
+    PanoramaLoss, Plateau, best_light, best_of, fit, fit_shaded, fit_with, from_each, matching_exposure,
+    random_starts,
 };
 pub use observation::Observation;
 pub use veni_light::{Error, Result};

@@ -3,10 +3,9 @@
 use std::f32::consts::TAU;
 
 use crate::FitTarget;
-use veni_image::LUMINANCE;
-use veni_image::{Panorama, Picture};
-use veni_light::sphere::{Equirect, View};
 use crate::{Error, Result};
+use veni_image::{Panorama, Picture, exposure, luminance};
+use veni_light::sphere::{Equirect, View};
 
 /// A cell counts as unknown if less of it is known.
 const LEAST_KNOWN: f32 = 0.1;
@@ -118,14 +117,11 @@ impl Observation {
         let darkest = counted.filter(|(v, k)| *k > 0.0 && **v > 0.0).map(|(v, _)| *v).reduce(f32::min);
         let darkest = darkest.ok_or_else(|| Error::invalid("no known pixel of the picture has positive radiance"))?;
         let mut log_radiance: Vec<f32> = radiance.iter().map(|v| v.max(darkest).ln()).collect();
-        let (mut sum, mut total) = (0.0f64, 0.0f64);
-        for ((rgb, known), area) in radiance.chunks_exact(3).zip(&known).zip(areas) {
-            let luminance: f32 = rgb.iter().zip(LUMINANCE).map(|(v, w)| v.max(darkest) * w).sum();
-            let weight = f64::from(known * area);
-            sum += weight * f64::from(luminance).ln();
-            total += weight;
-        }
-        let log_exposure = (sum / total) as f32;
+        let lit = |rgb: &[f32; 3]| f64::from(luminance(rgb.map(|v| v.max(darkest)))).ln();
+        let logs: Vec<f64> = radiance.as_chunks().0.iter().map(lit).collect();
+        let weights: Vec<f64> =
+            known.iter().zip(areas).map(|(known, area)| f64::from(known * area)).collect();
+        let log_exposure = exposure::over_pixels(&logs, &weights);
         log_radiance.iter_mut().for_each(|v| *v -= log_exposure);
         let clipped = clips.map(|clips| clips.as_flattened().iter().map(|c| *c > 0.0).collect::<Vec<_>>());
         Ok(Self {

@@ -11,7 +11,7 @@
 //! | pictures of any shape, masks | [`Picture`], [`read_mask`] |
 //! | NaN, infinite, negative values | [`Panorama::sanitise`] |
 //! | other sizes, turned, mirrored | [`Panorama::resample`], [`Panorama::turn`], [`Panorama::mirror`] |
-//! | what the model works on | [`Panorama::log`], [`Panorama::mean_log_luminance`] |
+//! | what the model works on | [`Panorama::log`], [`Panorama::mean_log_luminance`], [`exposure`] |
 //! | to a screen | [`tonemap`], [`Sheet`] |
 //! | how close two panoramas are | [`metrics`] |
 //! | EXR, `.hdr`, PNG files, whole or row by row | [`Panorama::write`], [`write_rows`] |
@@ -19,6 +19,7 @@
 #![forbid(unsafe_code)]
 
 mod colour;
+pub mod exposure;
 pub mod metrics;
 mod picture;
 mod read;
@@ -119,14 +120,8 @@ impl Panorama {
     /// Solid-angle-weighted mean of ln(luminance + [`LOG_FLOOR`]) over the sphere: the `log_exposure` that is
     /// subtracted from the log radiance before encoding and added back after decoding.
     pub fn mean_log_luminance(&self) -> f32 {
-        let width = self.grid.width;
-        let total: f64 = (self.pixels.chunks_exact(width).enumerate())
-            .map(|(row, pixels)| {
-                let sum: f64 = pixels.iter().map(|&p| f64::from(luminance(p) + LOG_FLOOR).ln()).sum();
-                sum * self.grid.solid_angle(row)
-            })
-            .sum();
-        (total / (4.0 * std::f64::consts::PI)) as f32
+        let logs = self.pixels.iter().map(|&p| f64::from(luminance(p) + LOG_FLOOR).ln());
+        exposure::over_sphere(self.grid, &logs.collect::<Vec<_>>())
     }
 
     /// Multiplies every value by `factor`.

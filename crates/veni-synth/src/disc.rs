@@ -5,7 +5,7 @@ use std::f32::consts::{PI, TAU};
 use glam::Vec3;
 
 use super::atmosphere::SUN_RADIUS;
-use super::random::{Draw, Stream};
+use super::random::{Draw, Part};
 use super::stage::Stage;
 use veni_light::sphere::Equirect;
 
@@ -84,7 +84,7 @@ fn disc(centre: Vec3, radius: f32, grid: Equirect, phase: f32) -> impl Iterator<
 /// Stars down to magnitude 6.5, as many of each as there are (Allen's Astrophysical Quantities: log N grows by 0.51
 /// per magnitude), evenly over the sky.
 fn stars(stage: &Stage<'_>) -> Vec<(Vec3, Vec3)> {
-    let mut draw = Draw::new(stage.scene.seed, stage.scene.index, Stream::Stars);
+    let mut draw = Draw::new(stage.scene.seed, stage.scene.index, Part::Stars);
     (0..4000)
         .map(|_| {
             let magnitude = 6.5 + draw.unit().max(1e-4).log10() / 0.51;

@@ -9,7 +9,7 @@ mod land;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::random::{Draw, Stream};
+use super::random::{Draw, Part};
 use super::scene::{Moon, Place, Scene, SkyKind};
 use super::view::sun_in_view;
 use clouds::clouds;
@@ -64,7 +64,7 @@ impl Scene {
     /// Scene `index` of the set with this seed. Scenes of a set do not depend on each other, and what is not `fixed`
     /// does not depend on what is, except where it must (the colour of dusk on the height of the sun).
     pub fn draw(seed: u64, index: u64, fixed: &Fixed) -> Self {
-        let mut draw = Draw::new(seed, index, Stream::Scene);
+        let mut draw = Draw::new(seed, index, Part::Scene);
         let draw = &mut draw;
         let sky = draw.weighted(&[
             (0.29, SkyKind::Clear),
@@ -139,7 +139,7 @@ impl Scene {
     /// Turns the sun to where the viewer sees it, if there is such a place. Photographers who measure light wait for the
     /// sun and step out of the shade: more suns are in view than chance would have.
     fn seek_sun(&mut self) {
-        let mut draw = Draw::new(self.seed, self.index, Stream::Sun);
+        let mut draw = Draw::new(self.seed, self.index, Part::Sun);
         if draw.chance(SUN_SOUGHT) {
             let azimuths: [f32; 12] = std::array::from_fn(|_| draw.azimuth().to_degrees());
             let first = std::iter::once(self.sun_azimuth);

@@ -9,7 +9,7 @@ mod tests;
 
 use glam::{Vec2, Vec3};
 
-use super::random::{Draw, Stream};
+use super::random::{Draw, Part};
 use super::scene::{Place, Scene};
 use super::skin::Skin;
 use super::solid::{Shape, Solid};
@@ -51,7 +51,7 @@ pub(super) struct Layout {
 /// Builds the surroundings; a function of the scene alone.
 pub(super) fn layout(scene: &Scene) -> Layout {
     let mut builder = Builder {
-        draw: Draw::new(scene.seed, scene.index, Stream::Layout),
+        draw: Draw::new(scene.seed, scene.index, Part::Layout),
         lit: scene.lit,
         snow: scene.ground.surface == super::surface::Surface::Snow,
         bearing: Vec2::from_angle(scene.ground.bearing.to_radians()),

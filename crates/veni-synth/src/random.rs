@@ -1,11 +1,10 @@
 //! Draws for scenes: streams named by (seed, index, what for), as everywhere in veni.
 
-use rand::{Rng, SeedableRng};
-use chacha20::ChaCha8Rng;
+use veni_light::random::Stream;
 
 /// What a stream of one scene is for.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Stream {
+pub(super) enum Part {
     /// The parameters of the scene.
     Scene,
     /// Where things stand.
@@ -17,17 +16,12 @@ pub(super) enum Stream {
 }
 
 /// A stream of random numbers with the draws that scenes need.
-pub(super) struct Draw(ChaCha8Rng);
+pub(super) struct Draw(Stream);
 
 impl Draw {
-    pub(super) fn new(seed: u64, index: u64, stream: Stream) -> Self {
-        let mut key = [0; 32];
+    pub(super) fn new(seed: u64, index: u64, part: Part) -> Self {
         // the last word keeps these streams apart from those of training
-        for (bytes, word) in key.chunks_exact_mut(8).zip([seed, index, stream as u64, 0x5359_4e54_4853_4b59])
-        {
-            bytes.copy_from_slice(&word.to_le_bytes());
-        }
-        Self(ChaCha8Rng::from_seed(key))
+        Self(Stream::from_key([seed, index, part as u64, 0x5359_4e54_4853_4b59]))
     }
 
     /// Uniform in [0, 1).
@@ -47,9 +41,7 @@ impl Draw {
 
     /// Normal with this mean and deviation.
     pub(super) fn normal(&mut self, mean: f32, deviation: f32) -> f32 {
-        use rand_distr::{Distribution, StandardNormal};
-        let x: f32 = StandardNormal.sample(&mut self.0);
-        mean + deviation * x
+        mean + deviation * self.0.normal() as f32
     }
 
     pub(super) fn chance(&mut self, probability: f32) -> bool {

@@ -14,13 +14,12 @@
 mod onnx_file;
 
 use std::time::Instant;
+use veni_core::random::Stream;
 
 use onnx_file::OnnxFile;
-use rand::SeedableRng;
-use rand_distr::{Distribution, Normal};
+use veni_core::expand::Expand;
 use veni_core::expand::Expand;
 use veni_core::expand::ExpandOptions;
-use veni_core::expand::Expand;
 use veni_core::expand::network::{NetworkOptions, OnnxNetwork};
 use veni_core::panorama::{LdrPanorama, Transfer};
 use veni_core::sphere::Equirect;
@@ -64,14 +63,14 @@ fn sky(grid: Equirect) -> LdrPanorama {
 }
 
 fn network(channels: u64, layers: u64) -> Result<Vec<u8>, Failure> {
-    let mut rng = chacha20::ChaCha8Rng::seed_from_u64(1);
+    let mut rng = Stream::from_seed(1);
     let mut file = OnnxFile::image([0, 0]);
     let mut from = "x".to_owned();
     for layer in 0..layers + 2 {
         let inputs = if layer == 0 { 3 } else { channels };
         let outputs = if layer == layers + 1 { 3 } else { channels };
-        let weights = Normal::new(0.0, (2.0 / (9.0 * inputs as f32)).sqrt())?;
-        let values: Vec<f32> = (0..outputs * inputs * 9).map(|_| weights.sample(&mut rng)).collect();
+        let deviation = (2.0 / (9.0 * inputs as f32)).sqrt();
+        let values: Vec<f32> = (0..outputs * inputs * 9).map(|_| deviation * rng.normal() as f32).collect();
         let (weight, sum, out) = (format!("w{layer}"), format!("s{layer}"), format!("a{layer}"));
         let last = layer == layers + 1;
         let ints: [(&str, &[u64]); 3] =

@@ -2,11 +2,12 @@
 
 use burn::tensor::Device;
 use veni_light::model::{DecoderConfig, Model, ModelConfig, ModelInfo};
-use veni_light::random::{Purpose, normal, stream};
+use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
 use super::shade::{
-    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedImage, ShadedLoss, ShadingForm, Surface, Transfer,
+    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedImage, ShadedLoss, ShadingForm, Surface,
+    Transfer,
 };
 use super::*;
 use crate::train::loss::LossConfig;
@@ -19,7 +20,7 @@ fn decoder() -> Decoder {
 
 fn latent(seed: u64) -> Latent {
     let mut rng = stream(seed, Purpose::Fit, 0, 0);
-    Latent::new((0..3).map(|_| [0; 3].map(|_| normal(&mut rng) as f32)).collect())
+    Latent::new((0..3).map(|_| [0; 3].map(|_| rng.normal() as f32)).collect())
 }
 
 fn image(decoder: &Decoder, grid: Equirect, seed: u64) -> Vec<f32> {

@@ -2,11 +2,11 @@
 
 use super::norm::COORDINATE;
 use super::{VectorLinear, VectorLinearConfig};
-use veni_light::model::VectorLayer;
 use burn::module::Module;
 use burn::tensor::activation::softmax;
 use burn::tensor::{Bool, Device, Tensor};
-use rand::Rng;
+use veni_light::model::VectorLayer;
+use veni_light::random::Stream;
 
 /// Sizes of a [`VectorAttention`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +44,7 @@ pub struct VectorAttention {
 
 impl VectorAttentionConfig {
     /// Draws the weights.
-    pub fn init(&self, rng: &mut impl Rng, device: &Device) -> VectorAttention {
+    pub fn init(&self, rng: &mut Stream, device: &Device) -> VectorAttention {
         let Self { layer, channels, heads, head_channels, coordinates } = *self;
         let inner = heads * head_channels;
         let into = VectorLinearConfig::new(layer, channels, inner, coordinates);

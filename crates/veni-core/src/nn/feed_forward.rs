@@ -4,11 +4,11 @@ use super::so2_linear::So2Feature;
 use super::vn_linear::matmul_channels;
 use super::vn_relu::vn_relu;
 use super::{VectorLinear, VectorLinearConfig, VnRelu, VnReluConfig};
-use veni_light::model::{VectorLayer, VnReluForm};
 use burn::module::Module;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
-use rand::Rng;
+use veni_light::model::{VectorLayer, VnReluForm};
+use veni_light::random::Stream;
 
 /// Sizes of a [`VectorFeedForward`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub struct GateWeights {
 
 impl VectorFeedForwardConfig {
     /// Draws the weights.
-    pub fn init(&self, rng: &mut impl Rng, device: &Device) -> VectorFeedForward {
+    pub fn init(&self, rng: &mut Stream, device: &Device) -> VectorFeedForward {
         let Self { layer, channels, expansion, coordinates, form } = *self;
         let inner = channels * expansion;
         VectorFeedForward {

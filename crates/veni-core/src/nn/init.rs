@@ -2,8 +2,7 @@
 
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
-use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
+use veni_light::random::Stream;
 
 /// A trainable tensor of `shape` with entries U(−bound, bound), in row-major order of the generator's words.
 ///
@@ -11,7 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 pub fn uniform<const D: usize>(
     shape: [usize; D],
     bound: f64,
-    rng: &mut impl Rng,
+    rng: &mut Stream,
     device: &Device,
 ) -> Param<Tensor<D>> {
     let values: Vec<f32> = (0..shape.iter().product::<usize>())
@@ -27,25 +26,22 @@ pub fn uniform<const D: usize>(
 pub fn normal<const D: usize>(
     shape: [usize; D],
     [mean, deviation]: [f64; 2],
-    rng: &mut impl Rng,
+    rng: &mut Stream,
     device: &Device,
 ) -> Param<Tensor<D>> {
-    let draw = |rng: &mut _| -> f64 { StandardNormal.sample(rng) };
     let count = shape.iter().product::<usize>();
-    let values: Vec<f32> = (0..count).map(|_| (mean + deviation * draw(rng)) as f32).collect();
+    let values: Vec<f32> = (0..count).map(|_| (mean + deviation * rng.normal()) as f32).collect();
     Param::from_data(TensorData::new(values, shape), device)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::SeedableRng;
-    use chacha20::ChaCha8Rng;
 
     #[test]
     fn values_follow_the_seed_and_fill_the_interval() {
         let draw = |seed| -> Vec<f32> {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut rng = Stream::from_seed(seed);
             uniform([40, 50], 0.25, &mut rng, &Device::flex()).val().try_into_vec_as().unwrap()
         };
         let a = draw(1);

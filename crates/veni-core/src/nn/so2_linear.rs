@@ -5,7 +5,7 @@ use super::norm::{COORDINATE, coordinate_norm};
 use super::vn_linear::matmul_channels;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
-use rand::Rng;
+use veni_light::random::Stream;
 
 /// Sizes of a [`So2Linear`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub struct So2Linear {
 
 impl So2LinearConfig {
     /// Draws the weights.
-    pub fn init(&self, rng: &mut impl Rng, device: &Device) -> So2Linear {
+    pub fn init(&self, rng: &mut Stream, device: &Device) -> So2Linear {
         let Self { input, output, invariants_in, invariants_out } = *self;
         let terms = input * (invariants_in + 1);
         let equivariant_bound = 1.0 / ((terms + output) as f64).sqrt();

@@ -5,7 +5,7 @@ use super::{VnRelu, VnReluConfig};
 use burn::module::Module;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
-use rand::Rng;
+use veni_light::random::Stream;
 
 /// [`VnRelu`] on x and y, max(·, 0) on each invariant coordinate.
 #[derive(Module, Debug)]
@@ -16,7 +16,7 @@ pub struct So2Relu {
 
 impl So2Relu {
     /// Draws the weights of the equivariant part.
-    pub fn init(config: VnReluConfig, rng: &mut impl Rng, device: &Device) -> Self {
+    pub fn init(config: VnReluConfig, rng: &mut Stream, device: &Device) -> Self {
         Self { vn: config.init(rng, device) }
     }
 
@@ -34,8 +34,8 @@ impl So2Relu {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use veni_light::model::VnReluForm;
     use crate::nn::testing::{assert_gradients, features, max_difference, rng, rotate_xy};
+    use veni_light::model::VnReluForm;
 
     #[test]
     fn commutes_with_rotation_and_has_the_right_gradients() {

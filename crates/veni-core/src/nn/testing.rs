@@ -2,11 +2,10 @@
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData};
-use rand::{Rng, SeedableRng};
-use chacha20::ChaCha8Rng;
+use veni_light::random::Stream;
 
-pub(crate) fn rng(seed: u64) -> ChaCha8Rng {
-    ChaCha8Rng::seed_from_u64(seed)
+pub(crate) fn rng(seed: u64) -> Stream {
+    Stream::from_seed(seed)
 }
 
 /// Entries U(−1, 1).

@@ -4,10 +4,10 @@ use super::{
     GateWeights, VectorAttention, VectorAttentionConfig, VectorFeedForward, VectorFeedForwardConfig,
     VnLayerNorm, VnLayerNormConfig,
 };
-use veni_light::model::{VectorLayer, VnReluForm};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use rand::Rng;
+use veni_light::model::{VectorLayer, VnReluForm};
+use veni_light::random::Stream;
 
 /// Sizes of a [`VectorTransformer`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,7 +60,7 @@ pub struct FoldedGates(Vec<GateWeights>);
 
 impl VectorTransformerConfig {
     /// Draws the weights.
-    pub fn init(&self, rng: &mut impl Rng, device: &Device) -> VectorTransformer {
+    pub fn init(&self, rng: &mut Stream, device: &Device) -> VectorTransformer {
         let Self { layer, depth, channels, heads, head_channels, expansion, coordinates, form, final_norm } =
             *self;
         let attention = VectorAttentionConfig { layer, channels, heads, head_channels, coordinates };

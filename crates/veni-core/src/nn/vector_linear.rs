@@ -1,10 +1,10 @@
 //! Either linear layer behind one name.
 
 use super::{So2Linear, So2LinearConfig, VnLinear, VnLinearConfig};
-use veni_light::model::VectorLayer;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use rand::Rng;
+use veni_light::model::VectorLayer;
+use veni_light::random::Stream;
 
 /// Sizes of a [`VectorLinear`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ impl VectorLinearConfig {
     ///
     /// # Panics
     /// If a Vector-Neuron layer is to change the number of coordinates, or an SO(2) layer has fewer than three.
-    pub fn init(&self, rng: &mut impl Rng, device: &Device) -> VectorLinear {
+    pub fn init(&self, rng: &mut Stream, device: &Device) -> VectorLinear {
         let Self { layer, input, output, coordinates_in, coordinates_out } = *self;
         match layer {
             VectorLayer::Vn => {

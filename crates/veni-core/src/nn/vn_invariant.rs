@@ -2,10 +2,10 @@
 
 use super::norm::COORDINATE;
 use super::{VnLinear, VnLinearConfig, VnRelu, VnReluConfig};
-use veni_light::model::VnReluForm;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use rand::Rng;
+use veni_light::model::VnReluForm;
+use veni_light::random::Stream;
 
 /// Sizes of a [`VnInvariant`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub struct VnInvariant {
 
 impl VnInvariantConfig {
     /// Draws the weights.
-    pub fn init(&self, rng: &mut impl Rng, device: &Device) -> VnInvariant {
+    pub fn init(&self, rng: &mut Stream, device: &Device) -> VnInvariant {
         VnInvariant {
             linear: VnLinearConfig::new(self.channels, self.coordinates).init(rng, device),
             relu: VnReluConfig { channels: self.coordinates, form: self.form }.init(rng, device),

@@ -3,7 +3,7 @@
 use super::init::uniform;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
-use rand::Rng;
+use veni_light::random::Stream;
 
 /// Sizes of a [`VnLinear`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,7 +38,7 @@ impl VnLinearConfig {
     }
 
     /// Draws the weights.
-    pub fn init(&self, rng: &mut impl Rng, device: &Device) -> VnLinear {
+    pub fn init(&self, rng: &mut Stream, device: &Device) -> VnLinear {
         let bound = 1.0 / (self.input as f64).sqrt();
         VnLinear {
             weight: uniform([self.input, self.output], bound, rng, device),

@@ -3,11 +3,11 @@
 use super::init::uniform;
 use super::norm::{COORDINATE, squared_coordinate_norm};
 use super::vn_linear::matmul_channels;
-use veni_light::model::VnReluForm;
 use burn::module::{Module, Param};
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
-use rand::Rng;
+use veni_light::model::VnReluForm;
+use veni_light::random::Stream;
 
 /// Size and form of a [`VnRelu`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub struct VnRelu {
 
 impl VnReluConfig {
     /// Draws the weights.
-    pub fn init(&self, rng: &mut impl Rng, device: &Device) -> VnRelu {
+    pub fn init(&self, rng: &mut Stream, device: &Device) -> VnRelu {
         let bound = 1.0 / (self.channels as f64).sqrt();
         let shape = [self.channels, self.channels];
         VnRelu {

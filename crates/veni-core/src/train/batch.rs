@@ -1,11 +1,11 @@
 //! What one step works on, prepared on the host while the previous step computes.
 
-use veni_data::coarsen::averaged;
-use veni_light::random::{Purpose, below, normal, stream, uniform};
-use veni_data::{AugmentConfig, Dataset};
-use veni_light::sphere::{Equirect, Stripes};
 use crate::train::config::{LossGrid, TrainConfig};
 use crate::train::draws::Draws;
+use veni_data::coarsen::averaged;
+use veni_data::{AugmentConfig, Dataset};
+use veni_light::random::{Purpose, Stream, stream};
+use veni_light::sphere::{Equirect, Stripes};
 
 /// The numbers of one step, row-major, channels last.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,8 +102,8 @@ impl<'a> Batches<'a> {
         };
         for slot in 0..self.batch {
             let image = self.augmented(self.draws.choice(step, slot), step, slot as u64);
-            let yaw = std::f64::consts::TAU
-                * uniform(&mut stream(self.seed, Purpose::Sampling, step, 1 + slot as u64));
+            let yaw =
+                std::f64::consts::TAU * stream(self.seed, Purpose::Sampling, step, 1 + slot as u64).uniform();
             // the grid is turned, not the image: samples and directions lie at −yaw, in the image's own frame
             let samples = self.stripes.gather_turned(grid, yaw).sample(image.as_chunks().0);
             batch.stripe_samples.extend(samples.into_flattened());
@@ -115,7 +115,7 @@ impl<'a> Batches<'a> {
             batch.stripe_directions.extend(self.directions.iter().flat_map(turned));
             loss.extend_target(&image, &mut batch.target);
             let mut noise = stream(self.seed, Purpose::Noise, step, slot as u64);
-            batch.noise.extend((0..3 * self.latent_vectors).map(|_| normal(&mut noise) as f32));
+            batch.noise.extend((0..3 * self.latent_vectors).map(|_| noise.normal() as f32));
         }
         batch
     }
@@ -140,9 +140,9 @@ struct LossView {
 }
 
 impl LossView {
-    fn new(kind: LossGrid, grid: Equirect, rng: &mut impl rand::Rng) -> Self {
+    fn new(kind: LossGrid, grid: Equirect, rng: &mut Stream) -> Self {
         let offset = match kind {
-            LossGrid::Strided { factor } => [below(rng, factor), below(rng, factor)],
+            LossGrid::Strided { factor } => [rng.below(factor), rng.below(factor)],
             LossGrid::Full | LossGrid::Averaged { .. } => [0; 2],
         };
         Self { grid, kind, offset }

@@ -2,11 +2,9 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use rand::Rng;
-
-use veni_data::Dataset;
-use veni_light::random::{Purpose, below, permutation, stream, uniform};
 use crate::train::config::{Order, TrainConfig};
+use veni_data::Dataset;
+use veni_light::random::{Purpose, Stream, stream};
 
 /// Draws panoramas, by their index in the training set. What is drawn is a pure function of the configuration and the
 /// place in the run.
@@ -47,15 +45,15 @@ impl Pool {
         let mut kept = self.order.lock().unwrap_or_else(PoisonError::into_inner);
         let order = match kept.take() {
             Some((of, order)) if of == epoch => order,
-            _ => permutation(&mut stream(seed, Purpose::Order, epoch, self.key), n as usize),
+            _ => stream(seed, Purpose::Order, epoch, self.key).permutation(n as usize),
         };
         let index = order[place];
         *kept = Some((epoch, order));
         self.panoramas[index]
     }
 
-    fn any(&self, rng: &mut impl Rng) -> usize {
-        self.panoramas[below(rng, self.panoramas.len())]
+    fn any(&self, rng: &mut Stream) -> usize {
+        self.panoramas[rng.below(self.panoramas.len())]
     }
 }
 
@@ -93,8 +91,8 @@ impl Draws {
     }
 
     /// A second panorama for an augmentation that combines two: of either kind with the probability that a draw has.
-    pub(super) fn partner(&self, rng: &mut impl Rng) -> usize {
-        let generated = self.share > 0.0 && uniform(rng) < self.share;
+    pub(super) fn partner(&self, rng: &mut Stream) -> usize {
+        let generated = self.share > 0.0 && rng.uniform() < self.share;
         if generated { &self.generated } else { &self.photographed }.any(rng)
     }
 }
@@ -102,9 +100,9 @@ impl Draws {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::train::presets::Preset;
     use veni_data::Item;
     use veni_light::sphere::Equirect;
-    use crate::train::presets::Preset;
 
     /// Five photographs and seven generated scenes.
     fn draws(order: Order, share: Option<f64>) -> Draws {

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use veni_light::model::{Model, ModelKind};
 use crate::train::config::TrainConfig;
 use crate::train::network::Network;
 use crate::vae::weights::{self, Weights};
 use crate::{Error, Result};
+use veni_light::model::{Model, ModelKind};
 
 /// The model whose weights a run begins with. Averages start from them, Adam's moments from 0.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,7 +40,7 @@ impl InitConfig {
     /// As [`Model::load`]; [`Error::Invalid`] if the digest is there and another one.
     pub fn open(&mut self) -> Result<Model> {
         let model = Model::load(&self.model)?;
-        let found = model.digest();
+        let found = model.digest().to_string();
         match &self.digest {
             Some(wanted) if *wanted != found => Err(Error::invalid(format!(
                 "{}: holds other weights (init.digest {found}) than the configuration was written for ({wanted}): name the \
@@ -147,10 +147,10 @@ fn options(part: &impl Serialize) -> Result<Table> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use veni_light::model::ModelInfo;
-    use veni_light::output::Overwrite;
     use crate::train::presets::Preset;
     use burn::tensor::Device;
+    use veni_light::model::ModelInfo;
+    use veni_light::output::Overwrite;
 
     fn network(config: &TrainConfig) -> Network {
         Network::new(config, 2, &Device::flex().autodiff()).unwrap()

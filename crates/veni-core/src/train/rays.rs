@@ -1,9 +1,9 @@
 //! What one step of an auto-decoder works on: rays of some panoramas.
 
-use veni_data::Dataset;
-use veni_light::random::{Purpose, below, normal, stream, uniform};
 use crate::train::config::TrainConfig;
 use crate::train::draws::Draws;
+use veni_data::Dataset;
+use veni_light::random::{Purpose, stream};
 
 /// The numbers of one step, row-major, channels last.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,14 +75,14 @@ impl<'a> RayBatches<'a> {
             let image = self.train.items()[*panorama].log_radiance.fetched();
             let mut rng = stream(self.seed, Purpose::Sampling, step, slot);
             for _ in 0..self.rays {
-                let height = uniform(&mut rng);
+                let height = rng.uniform();
                 let row = self.cumulated.partition_point(|share| *share <= height).min(grid.height - 1);
-                let column = below(&mut rng, grid.width);
+                let column = rng.below(grid.width);
                 batch.directions.extend(grid.direction(column, row));
                 batch.target.extend(&image[3 * (row * grid.width + column)..][..3]);
             }
             let mut noise = stream(self.seed, Purpose::Noise, step, slot);
-            batch.noise.extend((0..3 * self.latent_vectors).map(|_| normal(&mut noise) as f32));
+            batch.noise.extend((0..3 * self.latent_vectors).map(|_| noise.normal() as f32));
         }
         batch
     }
@@ -91,9 +91,9 @@ impl<'a> RayBatches<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::train::presets::Preset;
     use veni_data::Item;
     use veni_light::sphere::Equirect;
-    use crate::train::presets::Preset;
 
     #[test]
     fn rays_see_their_own_pixels_and_rows_by_solid_angle() {

@@ -1,7 +1,6 @@
 //! VN-ViT, the rotation-equivariant encoder: a panorama seen as vertical stripes, one token each. MODEL (13, 14).
 
 use super::Posterior;
-use veni_light::model::{EncoderConfig, Pooling, Reduction, VectorLayer};
 use crate::nn::{
     FoldedGates, VectorLinear, VectorLinearConfig, VectorTransformer, VectorTransformerConfig,
     coordinate_norm,
@@ -9,7 +8,8 @@ use crate::nn::{
 use crate::{Error, Result};
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
-use rand::Rng;
+use veni_light::model::{EncoderConfig, Pooling, Reduction, VectorLayer};
+use veni_light::random::Stream;
 
 /// x, y, z and the colours r, g, b of one sample.
 const SAMPLE_COORDINATES: usize = 6;
@@ -59,7 +59,7 @@ impl Encoder {
     pub fn new(
         config: &EncoderConfig,
         latent_vectors: usize,
-        rng: &mut impl Rng,
+        rng: &mut Stream,
         device: &Device,
     ) -> Result<Self> {
         check(config, latent_vectors)?;

@@ -2,13 +2,13 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Int, Tensor};
-use rand::Rng;
+use veni_light::random::Stream;
 
 use super::decoder::Condition;
 use super::{Decoder, weights};
-use veni_light::model::{Model, ModelConfig, ModelInfo};
 use crate::nn::normal;
 use crate::{Error, Result};
+use veni_light::model::{Model, ModelConfig, ModelInfo};
 
 /// Decoder and latent table. Parameter paths start with `decoder.` and `latents.`.
 #[derive(Module, Debug)]
@@ -47,7 +47,7 @@ impl LatentTable {
         panoramas: usize,
         latent_vectors: usize,
         free_exposure: bool,
-        rng: &mut impl Rng,
+        rng: &mut Stream,
         device: &Device,
     ) -> Self {
         let shape = [panoramas, latent_vectors, 3];
@@ -97,7 +97,7 @@ impl Reni {
         config: &ModelConfig,
         panoramas: usize,
         free_exposure: bool,
-        rng: &mut impl Rng,
+        rng: &mut Stream,
         device: &Device,
     ) -> Result<Self> {
         config.validate()?;

@@ -2,13 +2,13 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
-use rand::Rng;
+use veni_light::random::Stream;
 
 use super::weights::{self, Weights};
 use super::{Decoder, Encoder};
+use crate::{Error, Result};
 use veni_light::model::{Model, ModelConfig, ModelInfo};
 use veni_light::sphere::{Equirect, Stripes};
-use crate::{Error, Result};
 
 /// Images that go through the network together outside of training; bounds the memory.
 const CHUNK: usize = 8;
@@ -36,7 +36,7 @@ impl Veni {
     ///
     /// # Errors
     /// [`Error::Invalid`] if `config` is inconsistent or describes no encoder.
-    pub fn new(config: &ModelConfig, rng: &mut impl Rng, device: &Device) -> Result<Self> {
+    pub fn new(config: &ModelConfig, rng: &mut Stream, device: &Device) -> Result<Self> {
         config.validate()?;
         let encoder = config.encoder.as_ref();
         let encoder =
@@ -51,7 +51,7 @@ impl Veni {
     /// [`Error::Invalid`] if the file has no encoder, or its tensors are not those its configuration implies.
     pub fn from_model(model: &Model, device: &Device) -> Result<Self> {
         // every weight is replaced; the generator's only part is to give them a shape
-        let mut rng: chacha20::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
+        let mut rng = Stream::from_seed(0);
         let veni = Self::new(model.config(), &mut rng, device)?;
         let tensors = model.tensors().iter().filter(|(name, _)| !name.starts_with("prior."));
         weights::write(veni, "", &tensors.map(|(name, t)| (name.clone(), t.clone())).collect())

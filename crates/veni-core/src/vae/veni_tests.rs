@@ -3,10 +3,9 @@
 
 use std::f64::consts::TAU;
 use std::path::Path;
+use veni_light::random::Stream;
 
 use burn::tensor::Device;
-use rand::SeedableRng;
-use chacha20::ChaCha8Rng;
 
 use super::Veni;
 use veni_data::augment::{mirror, turn_columns};
@@ -40,7 +39,7 @@ impl Setup {
             decoder: DecoderConfig { hidden: 32, layers: 2, ..DecoderConfig::default() },
             encoder: Some(encoder),
         };
-        let veni = Veni::new(&config, &mut ChaCha8Rng::seed_from_u64(5), &Device::flex()).unwrap();
+        let veni = Veni::new(&config, &mut Stream::from_seed(5), &Device::flex()).unwrap();
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/panoramas/val");
         let grid = Equirect::new(128, 64);
         let set = Dataset::load(&panorama_files(&folder).unwrap()[..2], grid).unwrap();

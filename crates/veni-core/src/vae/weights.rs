@@ -156,15 +156,14 @@ impl ModuleMapper for Writer<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use veni_light::model::DecoderConfig;
     use crate::vae::Decoder;
     use burn::tensor::Device;
-    use rand::SeedableRng;
-    use chacha20::ChaCha8Rng;
+    use veni_light::model::DecoderConfig;
+    use veni_light::random::Stream;
 
     fn decoder(seed: u64) -> Decoder {
         let config = DecoderConfig { hidden: 8, layers: 2, heads: 2, ..DecoderConfig::default() };
-        Decoder::new(&config, 3, &mut ChaCha8Rng::seed_from_u64(seed), &Device::flex().autodiff())
+        Decoder::new(&config, 3, &mut Stream::from_seed(seed), &Device::flex().autodiff())
     }
 
     #[test]

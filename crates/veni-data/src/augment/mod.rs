@@ -9,8 +9,8 @@
 //! what the encoder's sampling grid hides inside one stripe; that is covered by the sampling yaw. Turns matter
 //! where two panoramas meet (mixing, recombination, joining), and there whole columns are enough and lose nothing.
 
-use rand::Rng;
 use serde::{Deserialize, Serialize};
+use veni_light::random::Stream;
 
 mod combine;
 mod warp;
@@ -18,8 +18,7 @@ mod warp;
 pub use combine::{join, mix, recombine};
 pub use warp::{azimuth_warp, mirror, polar_warp, turn_columns};
 
-use crate::exposure::centre_exposure;
-use veni_light::random::{below, normal, signed, uniform};
+use veni_image::exposure::centre_exposure;
 use veni_light::sphere::Equirect;
 
 /// Strengths and probabilities. The default is off: the identity.
@@ -90,12 +89,12 @@ impl AugmentConfig {
     /// Augments `image` (log radiance at exposure 0, length 3·W·H). `other` fetches a second panorama of the
     /// same size, drawn with the given stream, when mixing, recombining or joining needs one. The result is brought
     /// back to exposure 0 before the exposure jitter, whenever anything but a turn or mirror touched it.
-    pub fn apply<'a, R: Rng>(
+    pub fn apply<'a>(
         &self,
         grid: Equirect,
         image: &[f32],
-        rng: &mut R,
-        mut other: impl FnMut(&mut R) -> &'a [f32],
+        rng: &mut Stream,
+        mut other: impl FnMut(&mut Stream) -> &'a [f32],
     ) -> Vec<f32> {
         let mut out = image.to_vec();
         let mut touched = false;
@@ -106,32 +105,32 @@ impl AugmentConfig {
         }
         if happens(rng, self.join) {
             let second = self.oriented(grid, other(rng), rng, true);
-            let bearing = std::f64::consts::TAU * uniform(rng);
-            join(grid, &mut out, &second, bearing, 0.5 * signed(rng), self.join_blend);
+            let bearing = std::f64::consts::TAU * rng.uniform();
+            join(grid, &mut out, &second, bearing, 0.5 * rng.signed(), self.join_blend);
             touched = true;
         }
         if happens(rng, self.mix) {
             let second = self.oriented(grid, other(rng), rng, true);
-            mix(&mut out, &second, self.mix_share * uniform(rng));
+            mix(&mut out, &second, self.mix_share * rng.uniform());
             touched = true;
         }
         out = self.oriented(grid, &out, rng, false);
         if self.polar_warp > 0.0 {
-            out = polar_warp(grid, &out, self.polar_warp * signed(rng));
+            out = polar_warp(grid, &out, self.polar_warp * rng.signed());
             touched = true;
         }
         if self.azimuth_warp > 0.0 {
-            let bearing = std::f64::consts::TAU * uniform(rng);
-            out = azimuth_warp(grid, &out, self.azimuth_warp * signed(rng), bearing);
+            let bearing = std::f64::consts::TAU * rng.uniform();
+            out = azimuth_warp(grid, &out, self.azimuth_warp * rng.signed(), bearing);
             touched = true;
         }
         if self.contrast > 0.0 {
-            let gamma = (self.contrast * normal(rng)).exp() as f32;
+            let gamma = (self.contrast * rng.normal()).exp() as f32;
             out.iter_mut().for_each(|v| *v *= gamma);
             touched = true;
         }
         if self.white_balance > 0.0 {
-            let gains = [0; 3].map(|_| (self.white_balance * normal(rng)) as f32);
+            let gains = [0; 3].map(|_| (self.white_balance * rng.normal()) as f32);
             add_per_channel(&mut out, gains);
             touched = true;
         }
@@ -139,7 +138,7 @@ impl AugmentConfig {
             centre_exposure(grid, &mut out);
         }
         if self.exposure > 0.0 {
-            let gain = (self.exposure * std::f64::consts::LN_2 * normal(rng)) as f32;
+            let gain = (self.exposure * std::f64::consts::LN_2 * rng.normal()) as f32;
             add_per_channel(&mut out, [gain; 3]);
         }
         out
@@ -147,13 +146,13 @@ impl AugmentConfig {
 
     /// `image`, mirrored and turned as configured; a second panorama is always turned, or the two would keep
     /// the bearing in which they happened to be stored.
-    fn oriented(&self, grid: Equirect, image: &[f32], rng: &mut impl Rng, always: bool) -> Vec<f32> {
+    fn oriented(&self, grid: Equirect, image: &[f32], rng: &mut Stream, always: bool) -> Vec<f32> {
         let mut out = image.to_vec();
         if happens(rng, self.mirror) {
             mirror(grid, &mut out);
         }
         if always || happens(rng, self.turn) {
-            turn_columns(grid, &mut out, below(rng, grid.width));
+            turn_columns(grid, &mut out, rng.below(grid.width));
         }
         out
     }
@@ -161,8 +160,8 @@ impl AugmentConfig {
 
 /// One draw even for a probability of 0 would shift every later one; it does not matter, since a stream is
 /// owned by one sample of one step.
-fn happens(rng: &mut impl Rng, probability: f64) -> bool {
-    probability > 0.0 && uniform(rng) < probability
+fn happens(rng: &mut Stream, probability: f64) -> bool {
+    probability > 0.0 && rng.uniform() < probability
 }
 
 fn add_per_channel(image: &mut [f32], gains: [f32; 3]) {
@@ -174,14 +173,14 @@ fn add_per_channel(image: &mut [f32], gains: [f32; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exposure::log_exposure;
+    use veni_image::exposure::log_exposure;
     use veni_light::random::{Purpose, stream};
 
     pub(super) const GRID: Equirect = Equirect { width: 16, height: 8 };
 
     pub(super) fn image(seed: u64) -> Vec<f32> {
         let mut rng = stream(seed, Purpose::Fit, 0, 0);
-        let mut image: Vec<_> = (0..3 * GRID.len()).map(|_| normal(&mut rng) as f32).collect();
+        let mut image: Vec<_> = (0..3 * GRID.len()).map(|_| rng.normal() as f32).collect();
         centre_exposure(GRID, &mut image);
         image
     }

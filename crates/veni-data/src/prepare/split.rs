@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
+use veni_light::digest::Digest;
 
 /// A side of the split; a later one is better kept from training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -102,10 +102,9 @@ pub fn assign(keys: &[String], given: &[Option<Split>], shares: Shares, seed: u6
 
 /// A number in [0, 1) that a seed and a group's key decide.
 fn draw(seed: u64, key: &str) -> f64 {
-    let digest = Sha256::new().chain_update(seed.to_le_bytes()).chain_update(key.as_bytes()).finalize();
-    let bytes = digest.iter().take(8).fold(0u64, |all, byte| all << 8 | u64::from(*byte));
+    let digest = Digest::build().update(seed.to_le_bytes()).update(key).finish();
     // 53 bits, so that 1 is never reached by rounding
-    (bytes >> 11) as f64 / (1u64 << 53) as f64
+    (digest.number() >> 11) as f64 / (1u64 << 53) as f64
 }
 
 #[cfg(test)]

@@ -23,7 +23,6 @@
 //! # }
 //! ```
 
-mod adam;
 mod fitted;
 pub mod gaussians;
 pub mod harmonics;
@@ -31,7 +30,6 @@ mod least_squares;
 mod system;
 mod target;
 
-pub use adam::Adam;
 pub use fitted::{FLOOR, Field, Fitted};
 pub use system::{Baseline, Kind};
 pub use target::Space;

@@ -17,7 +17,7 @@ use burn::tensor::activation::relu;
 use burn::tensor::module::{conv2d, max_pool2d};
 use burn::tensor::ops::{ConvOptions, MaxPoolOptions};
 use burn::tensor::{Device, Tensor, TensorData};
-use sha2::{Digest, Sha256};
+use veni_light::digest::Digest;
 
 use self::weights::{Convolution, LAYERS, LayerWeights};
 use crate::{Error, Result};
@@ -35,7 +35,7 @@ pub const MIN_SIDE: usize = 31;
 pub struct Lpips {
     layers: Vec<Layer>,
     device: Device,
-    identity: String,
+    identity: Digest,
 }
 
 #[derive(Debug)]
@@ -62,13 +62,13 @@ impl Lpips {
     }
 
     fn new(weights: Vec<LayerWeights>, device: &Device) -> Self {
-        let mut sha = Sha256::new();
+        let mut digest = Digest::build();
         for layer in &weights {
             for part in [&layer.weight, &layer.bias, &layer.head] {
-                sha.update(bytemuck::cast_slice(part));
+                digest = digest.update(bytemuck::cast_slice::<_, u8>(part));
             }
         }
-        let identity = sha.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+        let identity = digest.finish();
         let layer = |(shape, w): (&Convolution, LayerWeights)| {
             let Convolution { inputs, outputs, kernel, .. } = *shape;
             let tensor = |values: Vec<f32>, size: [usize; 4]| {
@@ -84,9 +84,9 @@ impl Lpips {
         Self { layers: LAYERS.iter().zip(weights).map(layer).collect(), device: device.clone(), identity }
     }
 
-    /// Identity of the weights: 16 hexadecimal digits of a SHA-256 over them.
-    pub fn identity(&self) -> &str {
-        &self.identity
+    /// Identity of the weights: their digest.
+    pub fn identity(&self) -> Digest {
+        self.identity
     }
 
     /// d(a, b) of two images of display values in [0, 1], `[height, width, 3]`, sRGB.

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use super::weights::{LAYERS, LayerWeights};
 use super::*;
-use veni_light::random::{Purpose, signed, stream, uniform};
+use veni_light::random::{Purpose, stream};
 
 /// Pseudo-random weights that keep activations of order 1; heads are positive, as trained ones are.
 fn filler() -> Vec<LayerWeights> {
@@ -10,9 +10,9 @@ fn filler() -> Vec<LayerWeights> {
     let layer = |l: &Convolution| {
         let inputs = l.inputs * l.kernel * l.kernel;
         let amplitude = (6.0 / inputs as f64).sqrt();
-        let weight = (0..l.outputs * inputs).map(|_| (amplitude * signed(&mut rng)) as f32).collect();
-        let bias = (0..l.outputs).map(|_| (0.1 * signed(&mut rng)) as f32).collect();
-        let head = (0..l.outputs).map(|_| uniform(&mut rng) as f32).collect();
+        let weight = (0..l.outputs * inputs).map(|_| (amplitude * rng.signed()) as f32).collect();
+        let bias = (0..l.outputs).map(|_| (0.1 * rng.signed()) as f32).collect();
+        let head = (0..l.outputs).map(|_| rng.uniform() as f32).collect();
         LayerWeights { weight, bias, head }
     };
     LAYERS.iter().map(layer).collect()
@@ -20,7 +20,7 @@ fn filler() -> Vec<LayerWeights> {
 
 fn image(seed: u64, height: usize, width: usize) -> Vec<f32> {
     let mut rng = stream(seed, Purpose::Noise, 0, 0);
-    (0..3 * height * width).map(|_| uniform(&mut rng) as f32).collect()
+    (0..3 * height * width).map(|_| rng.uniform() as f32).collect()
 }
 
 /// Planes [channel][row][column] in f64.

@@ -8,14 +8,14 @@ use serde_json::json;
 
 use super::work::Work;
 use super::{Evaluation, Report, Share};
-use veni_light::random::{Purpose, normal, stream};
 use crate::figure::{Axis, Plot, Series};
-use veni_image::metrics::{log_error, spearman, weighted_log_error};
 use crate::store::Key;
-use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
-use veni_light::latent::Latent;
 use crate::{Error, Result};
+use veni_core::LoadedModel;
+use veni_image::metrics::{log_error, spearman, weighted_log_error};
+use veni_light::latent::Latent;
+use veni_light::random::{Purpose, stream};
 
 /// Pairs that are decoded and kept together.
 const BATCH: usize = 50;
@@ -133,7 +133,7 @@ fn distances<'a>(
         let mut rng = stream(seed, Purpose::Evaluation, pair as u64, slot);
         match source {
             Source::Standard => {
-                let vector = |_| [0; 3].map(|_| normal(&mut rng) as f32);
+                let vector = |_| [0; 3].map(|_| rng.normal() as f32);
                 Latent::new((0..subject.latent_vectors()).map(vector).collect())
             }
             // exposures differ without any latent differing: they are left out

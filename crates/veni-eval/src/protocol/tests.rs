@@ -7,14 +7,14 @@ use burn::tensor::Device;
 use serde_json::{Value, json};
 
 use super::*;
-use veni_light::random::{Purpose, stream};
-use veni_data::{Dataset, Item};
-use veni_image::metrics::{Alignment, log_error, scores, spearman, weighted_log_error};
 use crate::table::Cell;
-use veni_light::model::{DecoderConfig, EncoderConfig, Model, ModelConfig, ModelInfo, ModelKind};
-use veni_light::sphere::Equirect;
 use veni_core::train::presets::Preset;
 use veni_core::vae::Veni;
+use veni_data::{Dataset, Item};
+use veni_image::metrics::{Alignment, log_error, scores, spearman, weighted_log_error};
+use veni_light::model::{DecoderConfig, EncoderConfig, Model, ModelConfig, ModelInfo, ModelKind};
+use veni_light::random::{Purpose, stream};
+use veni_light::sphere::Equirect;
 
 const GRID: Equirect = Equirect { width: 32, height: 16 };
 
@@ -234,7 +234,7 @@ fn consistency_is_the_rank_correlation_of_its_definition() {
     for pair in 0..120 {
         let draw = |slot| {
             let mut rng = stream(0, Purpose::Evaluation, pair, slot);
-            let vector = |_| [0; 3].map(|_| veni_light::random::normal(&mut rng) as f32);
+            let vector = |_| [0; 3].map(|_| rng.normal() as f32);
             (0..3).map(vector).collect::<Vec<_>>()
         };
         let [a, b] = [draw(0), draw(1)];

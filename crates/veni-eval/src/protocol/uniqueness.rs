@@ -10,16 +10,17 @@ use serde_json::json;
 
 use super::work::{Work, images};
 use super::{Evaluation, Report, Share};
-use veni_light::random::{Purpose, normal, stream};
 use crate::figure::{Sheet, display, heat};
 use crate::fitting::FitSettings;
-use veni_image::metrics::{log_error, weighted_log_error};
-use crate::store::{Key, digest};
-use veni_core::LoadedModel;
+use crate::store::Key;
 use crate::table::{Cell, Table};
+use crate::{Error, Result};
+use veni_core::LoadedModel;
+use veni_image::metrics::{log_error, weighted_log_error};
+use veni_light::digest::Digest;
 use veni_light::latent::Latent;
 use veni_light::model::ModelKind;
-use crate::{Error, Result};
+use veni_light::random::{Purpose, stream};
 
 /// Both latents of a panorama.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -139,9 +140,9 @@ fn pairs<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel) -> Work<'a, Pair> {
 
 /// A latent from N(0, 1) that depends on the panorama itself, not on its place in the set.
 fn random(n: usize, seed: u64, image: &serde_json::Value, slot: u64) -> Latent {
-    let step = u64::from_str_radix(&digest([image.to_string().as_bytes()]), 16).unwrap_or_default();
+    let step = Digest::of(image.to_string()).number();
     let mut rng = stream(seed, Purpose::Evaluation, step, slot);
-    Latent::new((0..n).map(|_| [0; 3].map(|_| normal(&mut rng) as f32)).collect())
+    Latent::new((0..n).map(|_| [0; 3].map(|_| rng.normal() as f32)).collect())
 }
 
 fn measure(

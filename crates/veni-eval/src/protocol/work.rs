@@ -5,9 +5,10 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use super::{Evaluation, Share};
-use crate::store::{Key, digest};
-use veni_data::parallel::parallel;
+use crate::store::Key;
 use crate::{Error, Result};
+use veni_data::parallel::parallel;
+use veni_light::digest::Digest;
 
 /// Results that are kept: one key per `unit` of `task`, and how to compute what there is nothing of.
 pub(super) struct Work<'a, T> {
@@ -63,6 +64,7 @@ impl<'a, T: Serialize + DeserializeOwned + Send> Work<'a, T> {
 /// Identity of each panorama: its values and its size.
 pub(super) fn images(run: &Evaluation<'_>) -> Vec<Value> {
     let grid = run.data.grid();
-    let identity = |values: &[f32]| json!([grid.width, grid.height, digest([bytemuck::cast_slice(values)])]);
+    let digest = |values: &[f32]| Digest::of(bytemuck::cast_slice::<_, u8>(values));
+    let identity = |values: &[f32]| json!([grid.width, grid.height, digest(values)]);
     run.data.items().iter().map(|item| identity(&item.log_radiance)).collect()
 }

@@ -1,14 +1,13 @@
 //! The ways down: Adam on everything at once, Levenberg–Marquardt image by image. MODEL (37).
 
 use super::FitResult;
-use super::adam::Variable;
 use super::config::{FitConfig, Method};
 use super::levenberg_marquardt::{Search, Slopes};
 use super::network::{Evaluation, ImageLoss, Network};
 use super::pixel::PixelLoss;
 use super::plateau::PlateauDetector;
+use crate::{Adam, Error, Result};
 use veni_light::latent::{Latent, Prior};
-use crate::{Error, Result};
 
 /// Latents and exposures with a low loss, by the configured method.
 pub(super) fn optimise(
@@ -126,25 +125,30 @@ impl Descent<'_> {
     fn adam(&self, start: &[Latent], steps: u64, trace: &mut Trace<'_>) -> Result<Vec<Latent>> {
         let (n, config) = (self.penalty.prior.latent_vectors(), self.config);
         let flat = start.iter().flat_map(|z| z.vectors.as_flattened()).copied();
-        let mut vectors = Variable::new(flat.collect(), config.epsilon);
-        let mut exposures = Variable::new(start.iter().map(|z| z.log_exposure).collect(), config.epsilon);
-        let latents = |vectors: &Variable, exposures: &Variable| -> Vec<Latent> {
-            let each = vectors.values.as_chunks().0.chunks_exact(n).map(<[[f32; 3]]>::to_vec);
-            let both = each.zip(&exposures.values);
+        let mut vectors: Vec<f32> = flat.collect();
+        let mut exposures: Vec<f32> = start.iter().map(|z| z.log_exposure).collect();
+        let mut by_vectors = Adam::new(vectors.len(), config.epsilon);
+        let mut by_exposures = Adam::new(exposures.len(), config.epsilon);
+        let add = |values: &mut [f32], changes: Vec<f64>| {
+            values.iter_mut().zip(changes).for_each(|(x, by)| *x = (f64::from(*x) + by) as f32);
+        };
+        let latents = |vectors: &[f32], exposures: &[f32]| -> Vec<Latent> {
+            let each = vectors.as_chunks().0.chunks_exact(n).map(<[[f32; 3]]>::to_vec);
+            let both = each.zip(exposures);
             both.map(|(v, log_exposure)| Latent { log_exposure: *log_exposure, ..Latent::new(v) }).collect()
         };
         let mut plateau = PlateauDetector::new(config.plateau, start.len());
         for step in 0..steps {
             let mut found = self.network.evaluate(&latents(&vectors, &exposures), self.loss)?;
-            self.penalty.add_to(&vectors.values, &mut found);
+            self.penalty.add_to(&vectors, &mut found);
             trace.add(&found.losses)?;
             if plateau.ended(&found.losses) {
                 break;
             }
             let rate = config.learning_rate.at(step);
-            vectors.update(&found.gradient.vectors, rate, step + 1);
+            add(&mut vectors, by_vectors.step(&found.gradient.vectors, rate));
             if config.free_exposure {
-                exposures.update(&found.gradient.exposures, rate, step + 1);
+                add(&mut exposures, by_exposures.step(&found.gradient.exposures, rate));
             }
         }
         Ok(latents(&vectors, &exposures))

@@ -4,7 +4,6 @@
 //! the image. s stays as it is unless it is asked to be free. An image may be a panorama, a part of one
 //! ([`FitTarget::masked`]), or a view in any directions, clipped values included.
 
-mod adam;
 mod config;
 mod decoder;
 mod descent;

@@ -60,7 +60,7 @@ impl<'a> PixelLoss<'a> {
         let (white, shown) = match objective {
             Objective::Display { .. } => {
                 let white = white(image, &weights);
-                (white, image.iter().map(|i| display(f64::from(*i) - white).0).collect())
+                (white, image.iter().map(|i| tonemap::srgb_of_log(f64::from(*i) - white).0).collect())
             }
             _ => (0.0, Vec::new()),
         };
@@ -89,7 +89,7 @@ impl<'a> PixelLoss<'a> {
                     (root - ROUNDING, error / root, 1.0 / root)
                 }
                 Objective::Display { log } => {
-                    let (shown, by) = display(p - self.white);
+                    let (shown, by) = tonemap::srgb_of_log(p - self.white);
                     let difference = shown - self.shown[k];
                     let slope = 2.0 * difference * by + 2.0 * log * error;
                     (difference * difference + log * error * error, slope, 2.0 * by * by + 2.0 * log)
@@ -130,17 +130,4 @@ fn white(image: &[f32], weights: &[f64]) -> f64 {
     let known = image.chunks_exact(3).zip(weights).filter(|(_, w)| **w > 0.0);
     let radiance: Vec<f32> = known.flat_map(|(rgb, _)| rgb.iter().map(|v| v.exp())).collect();
     f64::from(tonemap::quantile(&radiance, 0.98)).ln()
-}
-
-/// The sRGB curve of min(eˣ, 1), and its derivative by x.
-fn display(x: f64) -> (f64, f64) {
-    if x >= 0.0 {
-        return (1.0, 0.0);
-    }
-    let linear = x.exp();
-    if linear < 0.003_130_8 {
-        return (12.92 * linear, 12.92 * linear);
-    }
-    let curved = 1.055 * linear.powf(1.0 / 2.4);
-    (curved - 0.055, curved / 2.4)
 }

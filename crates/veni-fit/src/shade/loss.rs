@@ -3,8 +3,8 @@
 use super::Transfer;
 use super::transfer::check_image;
 use super::vector::dot;
-use veni_image::tonemap::{REFERENCE_QUANTILE, quantile, srgb};
 use crate::{Error, Result};
+use veni_image::tonemap::{REFERENCE_QUANTILE, quantile, srgb, srgb_slope};
 
 /// What [`ShadedImage`](super::ShadedImage) minimises: R is the rendering, T the target, both linear radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -163,10 +163,7 @@ impl Comparison {
 fn display(r: [f64; 3], t: [f64; 3], white: f64) -> ([f64; 2], [[f64; 3]; 2]) {
     let shown = |v: [f64; 3]| v.map(|v| f64::from(srgb((v / white) as f32)));
     let (a, b) = (shown(r), shown(t));
-    let slope = r.map(|v| {
-        let x = v / white;
-        if x <= 0.003_130_8 { 12.92 / white } else { 1.055 / 2.4 * x.powf(1.0 / 2.4 - 1.0) / white }
-    });
+    let slope = r.map(|v| srgb_slope(v / white) / white);
     let difference = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let square = dot(difference, difference) / 3.0;
     let squares = [0, 1, 2].map(|c| 2.0 / 3.0 * difference[c] * slope[c]);

@@ -1,6 +1,7 @@
 //! How likely a code is under a prior. MODEL (36).
 
 use super::Prior;
+use crate::cholesky::{self, Complex};
 
 impl Prior {
     /// −ln p of the vectors up to a constant, |L⁻¹c|² + ½ |K⁻¹(z − μ)|² in the notation of [`Prior`], and its
@@ -11,43 +12,21 @@ impl Prior {
     pub fn energy(&self, vectors: &[[f32; 3]]) -> (f64, Vec<[f64; 3]>) {
         let n = self.latent_vectors();
         assert_eq!(vectors.len(), n, "a prior of {n} vectors");
-        let xy = |k: usize| [f64::from(self.xy_real[k]), f64::from(self.xy_imaginary[k])];
-        let z = |k: usize| [f64::from(self.z[k]), 0.0];
-        let c: Vec<_> = vectors.iter().map(|v| [f64::from(v[0]), f64::from(v[1])]).collect();
-        let centred = vectors.iter().zip(&self.z_mean).map(|(v, m)| [f64::from(v[2]) - f64::from(*m), 0.0]);
-        let w = forward(n, &xy, c);
-        let g = forward(n, &z, centred.collect());
-        let square = |v: &[[f64; 2]]| v.iter().map(|[a, b]| a * a + b * b).sum::<f64>();
-        let energy = square(&w) + 0.5 * square(&g);
-        let (by_xy, by_z) = (backward(n, &xy, w), backward(n, &z, g));
-        let both = by_xy.into_iter().zip(by_z);
-        (energy, both.map(|([x, y], [z, _])| [2.0 * x, 2.0 * y, z]).collect())
+        let parts = self.xy_real.iter().zip(&self.xy_imaginary);
+        let xy: Vec<Complex> = parts.map(|(re, im)| [f64::from(*re), f64::from(*im)]).collect();
+        let z: Vec<f64> = self.z.iter().copied().map(f64::from).collect();
+        let mut c: Vec<[Complex; 1]> = vectors.iter().map(|v| [[f64::from(v[0]), f64::from(v[1])]]).collect();
+        let centred = vectors.iter().zip(&self.z_mean).map(|(v, m)| [f64::from(v[2]) - f64::from(*m)]);
+        let mut centred: Vec<[f64; 1]> = centred.collect();
+        cholesky::forward(&xy, n, &mut c);
+        cholesky::forward(&z, n, &mut centred);
+        let energy = c.iter().map(|[[a, b]]| a * a + b * b).sum::<f64>()
+            + 0.5 * centred.iter().map(|[g]| g * g).sum::<f64>();
+        cholesky::backward(&xy, n, &mut c);
+        cholesky::backward(&z, n, &mut centred);
+        let both = c.into_iter().zip(centred);
+        (energy, both.map(|([[x, y]], [z])| [2.0 * x, 2.0 * y, z]).collect())
     }
-}
-
-/// L⁻¹ b for the lower triangle L, whose entries `at` gives row-major; complex numbers.
-fn forward(n: usize, at: &dyn Fn(usize) -> [f64; 2], mut b: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    for i in 0..n {
-        for j in 0..i {
-            let ([r, s], [p, q]) = (at(i * n + j), b[j]);
-            b[i] = [b[i][0] - (r * p - s * q), b[i][1] - (r * q + s * p)];
-        }
-        // a Cholesky factor's diagonal is real
-        b[i] = b[i].map(|v| v / at(i * n + i)[0]);
-    }
-    b
-}
-
-/// L⁻ᴴ b.
-fn backward(n: usize, at: &dyn Fn(usize) -> [f64; 2], mut b: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    for i in (0..n).rev() {
-        for j in i + 1..n {
-            let ([r, s], [p, q]) = (at(j * n + i), b[j]);
-            b[i] = [b[i][0] - (r * p + s * q), b[i][1] - (r * q - s * p)];
-        }
-        b[i] = b[i].map(|v| v / at(i * n + i)[0]);
-    }
-    b
 }
 
 #[cfg(test)]

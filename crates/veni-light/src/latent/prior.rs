@@ -5,9 +5,9 @@
 //! vectors turn and stretch together) and mean and covariance Σ of z. A sample is c = L w, z = μ + K g, with
 //! C = L Lᴴ, Σ = K Kᵀ, w circular complex normal (E|w|² = 1) and g standard normal.
 
-use rand::Rng;
-
-use super::{Latent, normal};
+use super::Latent;
+use crate::cholesky::{self, Complex, Scalar};
+use crate::random::Stream;
 use crate::{Error, Result};
 
 /// A turn-invariant Gaussian of N latent vectors, and a normal log exposure.
@@ -56,7 +56,7 @@ impl Prior {
     ///
     /// # Errors
     /// [`Error::Invalid`] if there are fewer than two codes, their N differ, a number is not finite, or
-    /// `variances` does not match.
+    /// `variances` does not match; if a covariance spans more orders of magnitude than f64 can factor.
     pub fn fit(codes: &[Latent], variances: Option<&[Vec<f32>]>) -> Result<Self> {
         if codes.len() < 2 {
             return Err(Error::invalid(format!("a prior needs at least two codes, got {}", codes.len())));
@@ -83,25 +83,26 @@ impl Prior {
         let xy = samples(&|_, [x, y, _]| [f64::from(x), f64::from(y)]);
         let z = samples(&|i, v| [f64::from(v[2]) - z_mean[i], 0.0]);
         // one variance per coordinate, and c has two of them
-        let xy = cholesky(shrunk_covariance(&xy, &noise, 2.0), n);
-        let z = cholesky(shrunk_covariance(&z, &noise, 1.0), n);
-        let part = |matrix: &[Complex], k: usize| matrix.iter().map(|c| c[k] as f32).collect();
+        let xy = factored(shrunk_covariance(&xy, &noise, 2.0), n, [0.0; 2])?;
+        let z = shrunk_covariance(&z, &noise, 1.0).into_iter().map(|[real, _]| real).collect();
+        let z: Vec<f64> = factored(z, n, 0.0)?;
+        let part = |k: usize| xy.iter().map(|c| c[k] as f32).collect();
         Ok(Self {
-            xy_real: part(&xy, 0),
-            xy_imaginary: part(&xy, 1),
-            z: part(&z, 0),
+            xy_real: part(0),
+            xy_imaginary: part(1),
+            z: z.iter().map(|v| *v as f32).collect(),
             z_mean: z_mean.iter().map(|v| *v as f32).collect(),
             log_exposure: [exposure as f32, spread as f32],
         })
     }
 
     /// Draws vectors and exposure; see [`Latent::sample`].
-    pub(super) fn sample<R: Rng + ?Sized>(&self, rng: &mut R) -> Latent {
+    pub(super) fn sample(&self, rng: &mut Stream) -> Latent {
         let n = self.latent_vectors();
         let w: Vec<[f64; 2]> =
-            (0..n).map(|_| normal::pair(rng).map(|g| g * std::f64::consts::FRAC_1_SQRT_2)).collect();
-        let g: Vec<f64> = (0..n.div_ceil(2)).flat_map(|_| normal::pair(rng)).collect();
-        let [exposure, _] = normal::pair(rng);
+            (0..n).map(|_| rng.normals().map(|g| g * std::f64::consts::FRAC_1_SQRT_2)).collect();
+        let g: Vec<f64> = (0..n.div_ceil(2)).flat_map(|_| rng.normals()).collect();
+        let [exposure, _] = rng.normals();
         let vector = |i: usize| {
             let mut v = [0.0, 0.0, f64::from(self.z_mean[i])];
             for j in 0..=i {
@@ -121,9 +122,6 @@ impl Prior {
         }
     }
 }
-
-/// [real, imaginary]
-type Complex = [f64; 2];
 
 fn mean_variances(codes: usize, n: usize, variances: Option<&[Vec<f32>]>) -> Result<Vec<f64>> {
     let mut mean = vec![0.0; n];
@@ -171,25 +169,14 @@ fn shrunk_covariance(samples: &[Vec<Complex>], noise: &[f64], k: f64) -> Vec<Com
     s
 }
 
-/// Lower triangle L with L Lᴴ = the given positive definite matrix; zeros above.
-fn cholesky(mut a: Vec<Complex>, n: usize) -> Vec<Complex> {
+/// Lower triangle L with L Lᴴ = the given matrix; zeros above.
+fn factored<T: Scalar>(mut a: Vec<T>, n: usize, zero: T) -> Result<Vec<T>> {
+    cholesky::factor(&mut a, n)
+        .ok_or_else(|| Error::invalid("the codes' covariance is not positive definite"))?;
     for i in 0..n {
-        for j in 0..=i {
-            let [mut re, mut im] = a[i * n + j];
-            for k in 0..j {
-                let ([p, q], [r, s]) = (a[i * n + k], a[j * n + k]);
-                re -= p * r + q * s;
-                im -= q * r - p * s;
-            }
-            // the floor on the diagonal keeps pivots positive; the guard is for its rounding
-            a[i * n + j] =
-                if i == j { [re.max(1e-14).sqrt(), 0.0] } else { [re, im].map(|v| v / a[j * n + j][0]) };
-        }
-        for j in i + 1..n {
-            a[i * n + j] = [0.0; 2];
-        }
+        a[i * n + i + 1..(i + 1) * n].fill(zero);
     }
-    a
+    Ok(a)
 }
 
 #[cfg(test)]

@@ -20,17 +20,14 @@ mod schema;
 
 use std::collections::BTreeMap;
 
-use sha2::{Digest, Sha256};
-
-pub use config::{
-    EncoderConfig, ModelConfig, ModelKind, Pooling, Reduction, VectorLayer, VnReluForm,
-};
+pub use config::{EncoderConfig, ModelConfig, ModelKind, Pooling, Reduction, VectorLayer, VnReluForm};
 pub use decoder::{Conditioning, DecoderConfig, Encoding, Equivariance, Invariance, OutputForm};
 pub use file::{MAX_FILE_BYTES, StoredType};
 pub use header::{FORMAT, ModelInfo, Training};
 pub use schema::decoder_schema;
 pub use schema::mapping_sizes;
 
+use crate::digest::Digest;
 use crate::{Error, Result};
 
 /// A named tensor's content, row-major.
@@ -137,35 +134,30 @@ impl Model {
     /// Identity of the decoder: 16 hexadecimal digits. A latent carries it, because a code means something
     /// only to the decoder it was made for.
     ///
-    /// The first 8 bytes of SHA-256 over, one after the other: the JSON of `[latent_vectors, decoder config]`,
+    /// The text of the [`Digest`] of, one after the other: the JSON of `[latent_vectors, decoder config]`,
     /// then for every decoder tensor in alphabetical order its name, a zero byte, and its values rounded to
     /// half precision, little endian. Encoder, prior and provenance do not enter, and neither does the stored
     /// type: stripping the encoder or storing f16 leaves existing latents valid.
     pub fn hash(&self) -> String {
-        let mut sha = Sha256::new();
         let sizes = (self.config.latent_vectors, &self.config.decoder);
-        sha.update(serde_json::to_vec(&sizes).unwrap_or_default());
-        for (name, tensor) in self.tensors.iter().filter(|(name, _)| name.starts_with("decoder.")) {
-            sha.update(name.as_bytes());
-            sha.update([0]);
+        let head = Digest::build().update(serde_json::to_vec(&sizes).unwrap_or_default());
+        let decoder = self.tensors.iter().filter(|(name, _)| name.starts_with("decoder."));
+        let all = decoder.fold(head, |digest, (name, tensor)| {
             let halves = tensor.data.iter().flat_map(|v| half::from_f32(*v).to_le_bytes());
-            sha.update(halves.collect::<Vec<u8>>());
-        }
-        sha.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+            digest.update(name).update([0]).update(halves.collect::<Vec<u8>>())
+        });
+        all.finish().to_string()
     }
 
-    /// Identity of all weights, encoder and prior included: the first 8 bytes of SHA-256, as 16 hexadecimal digits, over
-    /// the JSON of the configuration, then for every tensor in alphabetical order its name, a zero byte, and its
+    /// Identity of all weights, encoder and prior included: the digest of the JSON of the configuration, then for every tensor in alphabetical order its name, a zero byte, and its
     /// values as f32, little endian. Provenance does not enter.
-    pub fn digest(&self) -> String {
-        let mut sha = Sha256::new();
-        sha.update(serde_json::to_vec(&self.config).unwrap_or_default());
-        for (name, tensor) in &self.tensors {
-            sha.update(name.as_bytes());
-            sha.update([0]);
-            sha.update(tensor.data.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
-        }
-        sha.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+    pub fn digest(&self) -> Digest {
+        let head = Digest::build().update(serde_json::to_vec(&self.config).unwrap_or_default());
+        let all = self.tensors.iter().fold(head, |digest, (name, tensor)| {
+            let values = tensor.data.iter().flat_map(|v| v.to_le_bytes());
+            digest.update(name).update([0]).update(values.collect::<Vec<u8>>())
+        });
+        all.finish()
     }
 }
 

@@ -5,12 +5,10 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use veni_image::Transfer;
 use veni_data::expand::ExpandOptions;
-use veni_data::expand::network::{
-    Network, NetworkInput, NetworkOptions, NetworkOutput, NetworkScale,
-};
+use veni_data::expand::network::{Network, NetworkInput, NetworkOptions, NetworkOutput, NetworkScale};
 use veni_data::prepare::Expander;
+use veni_image::Transfer;
 use veni_light::sphere::Equirect;
 
 use super::network::NetworkSettings;
@@ -139,7 +137,7 @@ impl Expand {
 #[cfg(feature = "onnx")]
 fn load(model: &Path) -> Result<(Arc<dyn Network>, String)> {
     let network = veni_data::expand::network::OnnxNetwork::load(model)?;
-    let digest = network.digest().to_owned();
+    let digest = network.digest().to_string();
     Ok((Arc::new(network), digest))
 }
 

@@ -4,9 +4,9 @@ use std::sync::Mutex;
 
 use anyhow::Result;
 use rayon::prelude::*;
-use veni_light::output::Overwrite;
-use veni_image::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions};
 use veni_data::prepare::{Examined, PrepareConfig, content_hash, examine};
+use veni_image::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions};
+use veni_light::output::Overwrite;
 
 use super::network::NetworkSettings;
 use super::record::{Facts, Fate, Record};
@@ -73,7 +73,7 @@ fn fate(
         Fate::Refused(text.strip_prefix(&prefix).unwrap_or(&text).to_owned())
     };
     let id = match content_hash(&source.path) {
-        Ok(id) => id,
+        Ok(id) => id.to_string(),
         Err(error) => return Ok(refused(error)),
     };
     let examined = match examine(&source.path, config) {

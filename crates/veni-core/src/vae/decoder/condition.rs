@@ -1,11 +1,10 @@
 //! The Vector-Neuron invariants of the latent vectors.
 
-use veni_light::model::VnReluForm;
 use crate::nn::uniform;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
-use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
+use veni_light::model::VnReluForm;
+use veni_light::random::Stream;
 
 /// The Vector-Neuron invariant of each latent vector.
 ///
@@ -41,18 +40,17 @@ impl Condition {
     /// Under [`VnReluForm::Projection`] a channel with α_e β_e < 0 is exactly 0 for every latent and gets
     /// no gradient, so it would stay dead for ever. The sign of column e of U is therefore chosen such
     /// that every channel starts alive; U enters that form through the sign only.
-    pub fn new(form: VnReluForm, channels: usize, rng: &mut impl Rng, device: &Device) -> Self {
-        let mut draw = |n: usize, bound: f32| -> Vec<f32> {
-            (0..n).map(|_| rand::RngExt::random_range(rng, -bound..bound)).collect()
-        };
+    pub fn new(form: VnReluForm, channels: usize, rng: &mut Stream, device: &Device) -> Self {
+        let mut draw =
+            |n: usize, bound: f32| -> Vec<f32> { (0..n).map(|_| bound * rng.signed() as f32).collect() };
         let (c, bound) = (channels, (channels as f32).recip().sqrt());
         let weights = [draw(c, 1.0), draw(c * c, bound), draw(c * c, bound)];
         Self::of(form, uniform([1], 1.0, rng, device), weights, device)
     }
 
     /// The same with weights from N(0, 1), as in RENI++.
-    pub fn standard_normal(form: VnReluForm, channels: usize, rng: &mut impl Rng, device: &Device) -> Self {
-        let mut draw = |n: usize| -> Vec<f32> { (0..n).map(|_| StandardNormal.sample(rng)).collect() };
+    pub fn standard_normal(form: VnReluForm, channels: usize, rng: &mut Stream, device: &Device) -> Self {
+        let mut draw = |n: usize| -> Vec<f32> { (0..n).map(|_| rng.normal() as f32).collect() };
         let c = channels;
         let (weights, scale) = ([draw(c), draw(c * c), draw(c * c)], draw(1));
         let scale = Param::from_data(TensorData::new(scale, [1]), device);

@@ -3,7 +3,7 @@
 use super::linear::Linear;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, activation::relu, module};
-use rand::Rng;
+use veni_light::random::Stream;
 
 /// Added to the variance before its square root.
 const EPSILON: f64 = 1e-5;
@@ -57,7 +57,7 @@ pub struct Layer {
 
 impl Layer {
     /// A layer of width `hidden` conditioned on 3N = `condition` numbers.
-    pub fn new(condition: usize, hidden: usize, rng: &mut impl Rng, device: &Device) -> Self {
+    pub fn new(condition: usize, hidden: usize, rng: &mut Stream, device: &Device) -> Self {
         Self {
             value: Linear::new(condition, hidden, rng, device),
             out: Linear::new(hidden, hidden, rng, device),

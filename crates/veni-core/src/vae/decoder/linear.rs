@@ -3,7 +3,7 @@
 use crate::nn::uniform;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, module};
-use rand::Rng;
+use veni_light::random::Stream;
 
 /// y = x W + b on row vectors: weight `[in, out]`, bias `[out]`.
 #[derive(Module, Debug)]
@@ -16,7 +16,7 @@ pub struct Linear {
 
 impl Linear {
     /// Weight and bias uniform in ±1/√inputs.
-    pub fn new(inputs: usize, outputs: usize, rng: &mut impl Rng, device: &Device) -> Self {
+    pub fn new(inputs: usize, outputs: usize, rng: &mut Stream, device: &Device) -> Self {
         let bound = 1.0 / (inputs as f64).sqrt();
         Self {
             weight: uniform([inputs, outputs], bound, rng, device),

@@ -30,12 +30,11 @@ pub use layer::{Layer, Norm};
 pub use linear::Linear;
 pub use native::Native;
 pub use tokens::{Memory, TokenLayer, Tokens};
-
-use veni_light::model::{Conditioning, DecoderConfig, Model};
+use veni_light::random::Stream;
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use rand::Rng;
+use veni_light::model::{Conditioning, DecoderConfig, Model};
 
 use crate::Result;
 use crate::vae::weights;
@@ -78,7 +77,7 @@ impl Decoder {
     /// [`Error::Invalid`] if the model's tensors are not those its configuration implies.
     pub fn from_model(model: &Model, device: &Device) -> Result<Self> {
         // every weight is replaced; the generator's only part is to give them a shape
-        let mut rng: chacha20::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
+        let mut rng = Stream::from_seed(0);
         let decoder = Self::new(&model.config().decoder, model.latent_vectors(), &mut rng, device);
         let tensors = model.tensors().iter().filter(|(name, _)| name.starts_with("decoder."));
         weights::write(decoder, "decoder", &tensors.map(|(name, t)| (name.clone(), t.clone())).collect())
@@ -90,7 +89,7 @@ impl Decoder {
     ///
     /// # Panics
     /// If `config` is inconsistent ([`ModelConfig::validate`](veni_light::model::ModelConfig::validate)).
-    pub fn new(config: &DecoderConfig, latent_vectors: usize, rng: &mut impl Rng, device: &Device) -> Self {
+    pub fn new(config: &DecoderConfig, latent_vectors: usize, rng: &mut Stream, device: &Device) -> Self {
         let (n, hidden, conditioning) = (latent_vectors, config.hidden, config.conditioning);
         let (directional, told) = (config.direction_inputs(n), config.condition_inputs(n));
         let condition = config.vn_channels().map(|c| Condition::new(config.vn_relu, c, rng, device));

@@ -1,11 +1,11 @@
 //! Networks of sines: SIREN (concat conditioning) and its modulated form (FiLM). MODEL (21, 22).
 
 use super::Linear;
-use veni_light::model::DecoderConfig;
-use veni_light::model::mapping_sizes;
 use crate::nn::{normal, uniform};
 use burn::tensor::{Device, Tensor, activation::leaky_relu};
-use rand::Rng;
+use veni_light::model::DecoderConfig;
+use veni_light::model::mapping_sizes;
+use veni_light::random::Stream;
 
 /// Slope of the mapping network's leaky ReLU below 0.
 const SLOPE: f64 = 0.2;
@@ -20,18 +20,18 @@ pub(super) fn hidden_map(
     omega: f64,
     inputs: usize,
     outputs: usize,
-    rng: &mut impl Rng,
+    rng: &mut Stream,
     device: &Device,
 ) -> Linear {
     map((6.0 / inputs as f64).sqrt() / omega, inputs, outputs, rng, device)
 }
 
 /// The map inside the first sine: weights uniform in ±1/inputs, the bias in ±1/√inputs.
-pub(super) fn first_map(inputs: usize, outputs: usize, rng: &mut impl Rng, device: &Device) -> Linear {
+pub(super) fn first_map(inputs: usize, outputs: usize, rng: &mut Stream, device: &Device) -> Linear {
     map(1.0 / inputs as f64, inputs, outputs, rng, device)
 }
 
-fn map(bound: f64, inputs: usize, outputs: usize, rng: &mut impl Rng, device: &Device) -> Linear {
+fn map(bound: f64, inputs: usize, outputs: usize, rng: &mut Stream, device: &Device) -> Linear {
     Linear {
         weight: uniform([inputs, outputs], bound, rng, device),
         bias: uniform([outputs], 1.0 / (inputs as f64).sqrt(), rng, device),
@@ -40,7 +40,11 @@ fn map(bound: f64, inputs: usize, outputs: usize, rng: &mut impl Rng, device: &D
 
 /// ω of a network's maps at the start: FiLM's own, or the configured one.
 pub(super) fn initial_omega(config: &DecoderConfig) -> f64 {
-    if config.conditioning == veni_light::model::Conditioning::Film { INITIAL_FREQUENCY } else { config.omega }
+    if config.conditioning == veni_light::model::Conditioning::Film {
+        INITIAL_FREQUENCY
+    } else {
+        config.omega
+    }
 }
 
 /// FiLM's mapping network: weights normal with deviation √(2/(1 + 0.2²)/inputs) (He et al. 2015), those of the last
@@ -48,7 +52,7 @@ pub(super) fn initial_omega(config: &DecoderConfig) -> f64 {
 pub(super) fn mapping(
     config: &DecoderConfig,
     latent_vectors: usize,
-    rng: &mut impl Rng,
+    rng: &mut Stream,
     device: &Device,
 ) -> Vec<Linear> {
     let sizes = mapping_sizes(config, latent_vectors);

@@ -1,10 +1,9 @@
 use super::*;
-use veni_light::model::VnReluForm;
-use veni_light::sphere::Equirect;
 use crate::vae::weights;
 use burn::tensor::TensorData;
-use rand::SeedableRng;
-use chacha20::ChaCha8Rng;
+use veni_light::model::VnReluForm;
+use veni_light::random::Stream;
+use veni_light::sphere::Equirect;
 
 const N: usize = 4;
 const FORMS: [VnReluForm; 3] =
@@ -12,7 +11,7 @@ const FORMS: [VnReluForm; 3] =
 
 fn decoder(form: VnReluForm, device: &Device) -> Decoder {
     let config = DecoderConfig { hidden: 16, layers: 2, heads: 2, vn_relu: form, ..DecoderConfig::default() };
-    Decoder::new(&config, N, &mut ChaCha8Rng::seed_from_u64(7), device)
+    Decoder::new(&config, N, &mut Stream::from_seed(7), device)
 }
 
 /// Latents of two images, at which no ReLU of the test network is within a finite difference of its kink.
@@ -168,7 +167,7 @@ fn weight_gradients_agree_with_finite_differences() {
 fn conditioning_starts_alive_whatever_the_seed() {
     let device = Device::flex();
     for seed in 0..40 {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = Stream::from_seed(seed);
         let condition = Condition::new(VnReluForm::Projection, 2, &mut rng, &device);
         let a = condition.forward(latent(&device));
         let dead = values(&a).iter().filter(|v| **v == 0.0).count();
@@ -180,7 +179,7 @@ fn conditioning_starts_alive_whatever_the_seed() {
 fn the_seed_determines_the_weights() {
     let device = Device::flex();
     let build = |seed| {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = Stream::from_seed(seed);
         weights::read(&Decoder::new(&DecoderConfig::default(), 2, &mut rng, &device), "")
     };
     assert_eq!(build(1), build(1));

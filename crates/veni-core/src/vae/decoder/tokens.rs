@@ -9,7 +9,7 @@ use super::linear::Linear;
 use crate::nn::uniform;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, activation::softmax};
-use rand::Rng;
+use veni_light::random::Stream;
 
 /// Invariants of a latent vector to its token: t_i = x_i W + b_i. The bias is the vector's own, which tells the N
 /// vectors apart.
@@ -23,7 +23,7 @@ pub struct Tokens {
 
 impl Tokens {
     /// Weights uniform in ±1/√inputs, biases in ±1.
-    pub fn new(tokens: usize, inputs: usize, hidden: usize, rng: &mut impl Rng, device: &Device) -> Self {
+    pub fn new(tokens: usize, inputs: usize, hidden: usize, rng: &mut Stream, device: &Device) -> Self {
         Self {
             weight: uniform([inputs, hidden], 1.0 / (inputs as f64).sqrt(), rng, device),
             bias: uniform([tokens, hidden], 1.0, rng, device),
@@ -72,7 +72,7 @@ pub struct Memory {
 
 impl TokenLayer {
     /// A layer of width `hidden`, which `heads` divides.
-    pub fn new(hidden: usize, heads: usize, rng: &mut impl Rng, device: &Device) -> Self {
+    pub fn new(hidden: usize, heads: usize, rng: &mut Stream, device: &Device) -> Self {
         let mut square = || Linear::new(hidden, hidden, rng, device);
         let [query, key, value, out] = [square(), square(), square(), square()];
         let (ff1, ff2) = (square(), square());

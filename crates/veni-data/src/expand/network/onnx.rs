@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use rten::{DataType, Dimension, LoadError, LoadErrorKind, Model, NodeId, Value, ValueType};
-use sha2::{Digest, Sha256};
+use veni_light::digest::Digest;
 
 use super::Network;
 use crate::{Error, Result};
@@ -19,7 +19,7 @@ const TRIAL: [usize; 2] = [64, 128];
 #[derive(Debug)]
 pub struct OnnxNetwork {
     name: String,
-    digest: String,
+    digest: Digest,
     model: Model,
     input: NodeId,
     output: NodeId,
@@ -49,13 +49,13 @@ impl OnnxNetwork {
         Self::parse(name, bytes).map_err(|e| e.in_file(path))
     }
 
-    /// The first 16 hexadecimal digits of the SHA-256 of the file.
-    pub fn digest(&self) -> &str {
-        &self.digest
+    /// The digest of the file.
+    pub fn digest(&self) -> Digest {
+        self.digest
     }
 
     fn parse(name: String, bytes: Vec<u8>) -> Result<Self> {
-        let digest = Sha256::digest(&bytes).iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+        let digest = Digest::of(&bytes);
         if !is_whole(&bytes) {
             return Err(Error::invalid("is no ONNX model, or truncated"));
         }

@@ -1,10 +1,10 @@
 //! The search for the lobes: Adam from several starts.
 
 use super::{Gaussians, dot, greedy, shape};
-use crate::baseline::adam::Adam;
 use crate::baseline::target::Target;
-use veni_light::random::{Purpose, stream, uniform};
 use crate::{Error, Result};
+use veni_fit::Adam;
+use veni_light::random::{Purpose, stream};
 
 /// The widest lobe, about a constant over the sphere.
 const BLUNT: f64 = 0.05;
@@ -60,7 +60,7 @@ impl Search {
         let mut best: Option<(f64, Vec<f64>)> = None;
         for start in 0..self.starts {
             let mut rng = stream(self.seed, Purpose::Fit, 0, start);
-            let factor = || if start == 0 { 1.0 } else { 1.0 - 0.5 * uniform(&mut rng) };
+            let factor = || if start == 0 { 1.0 } else { 1.0 - 0.5 * rng.uniform() };
             let shapes = greedy::shapes(problem.target(), problem.lobes(), sharpest, factor);
             let (loss, x) = self.descend(problem, problem.start(&shapes), sharpest);
             if loss.is_finite() && best.as_ref().is_none_or(|(least, _)| loss < *least) {
@@ -85,7 +85,8 @@ impl Search {
                 best = (loss, x.clone());
             }
             let part = f64::from(step) / f64::from(self.steps.max(1));
-            adam.step(&mut x, &gradient, self.rates[0].powf(1.0 - part) * self.rates[1].powf(part));
+            let rate = self.rates[0].powf(1.0 - part) * self.rates[1].powf(part);
+            x.iter_mut().zip(adam.step(&gradient, rate)).for_each(|(x, by)| *x += by);
             for v in x[..shape::FREE * problem.lobes()].chunks_exact_mut(shape::FREE) {
                 // only the direction of the vector means something; at length 1 a step is an angle
                 let length = dot([v[0], v[1], v[2]], [v[0], v[1], v[2]]).sqrt();

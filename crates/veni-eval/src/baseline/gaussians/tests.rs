@@ -3,7 +3,7 @@ use super::mixture::Mixture;
 use super::separable::Separable;
 use super::*;
 use crate::baseline::Space;
-use veni_light::random::{Purpose, normal, stream};
+use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
 fn image(grid: Equirect) -> Vec<f32> {
@@ -14,7 +14,7 @@ fn image(grid: Equirect) -> Vec<f32> {
 /// Central differences in every free number.
 fn check_gradient(problem: &impl Problem) {
     let mut rng = stream(3, Purpose::Fit, 0, 0);
-    let shapes: Vec<f64> = (0..shape::FREE * problem.lobes()).map(|_| 0.8 * normal(&mut rng)).collect();
+    let shapes: Vec<f64> = (0..shape::FREE * problem.lobes()).map(|_| 0.8 * rng.normal()).collect();
     let x = problem.start(&shapes);
     let (_, gradient) = problem.loss(&x);
     assert_eq!(gradient.len(), x.len());

@@ -6,7 +6,7 @@ use super::pixel::PixelValue;
 use super::*;
 use veni_light::field;
 use veni_light::model::{DecoderConfig, Model, ModelConfig};
-use veni_light::random::{Purpose, normal, stream};
+use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
 /// A small decoder with weights from a formula.
@@ -18,7 +18,7 @@ pub(super) fn decoder() -> field::Decoder {
 
 pub(super) fn latent(seed: u64) -> Latent {
     let mut rng = stream(seed, Purpose::Fit, 0, 0);
-    Latent::new((0..3).map(|_| [0; 3].map(|_| normal(&mut rng) as f32)).collect())
+    Latent::new((0..3).map(|_| [0; 3].map(|_| rng.normal() as f32)).collect())
 }
 
 fn image(decoder: &field::Decoder, grid: Equirect, seed: u64) -> Vec<f32> {

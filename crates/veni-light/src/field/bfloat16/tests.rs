@@ -2,9 +2,8 @@
 //!
 //! A processor without bfloat16 has nothing to test but that it says so.
 
-use chacha20::ChaCha8Rng;
+use crate::random::Stream;
 use half::bf16;
-use rand::{RngExt, SeedableRng};
 
 use super::{Bfloat16, LANES, Pairs, Row, Wide, WidePairs};
 use crate::field::block::VECTORS;
@@ -22,8 +21,8 @@ fn token() -> Option<Bfloat16> {
     token
 }
 
-fn rows(count: usize, rng: &mut ChaCha8Rng) -> Vec<Row> {
-    (0..count).map(|_| [[0.0; LANES]; VECTORS].map(|v| v.map(|_| rng.random_range(-2.0..2.0f32)))).collect()
+fn rows(count: usize, rng: &mut Stream) -> Vec<Row> {
+    (0..count).map(|_| [[0.0; LANES]; VECTORS].map(|v| v.map(|_| 2.0 * rng.signed() as f32))).collect()
 }
 
 fn rounded(v: f32) -> f64 {
@@ -74,14 +73,13 @@ fn rounding_is_that_of_the_library() {
 #[test]
 fn products_are_sums_of_rounded_factors() {
     let Some(token) = token() else { return };
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut rng = Stream::from_seed(1);
     // one pair, an odd input, a whole part, a little more, several parts
     for (inputs, outputs) in [(1, 8), (5, 16), (128, 128), (129, 8), (500, 24)] {
-        let matrix: Vec<[f32; PANEL]> = (0..inputs * outputs / PANEL)
-            .map(|_| [0.0; PANEL].map(|_| rng.random_range(-1.0..1.0f32)))
-            .collect();
+        let matrix: Vec<[f32; PANEL]> =
+            (0..inputs * outputs / PANEL).map(|_| [0.0; PANEL].map(|_| rng.signed() as f32)).collect();
         let bias: Vec<[f32; PANEL]> =
-            (0..outputs / PANEL).map(|_| [0.0; PANEL].map(|_| rng.random_range(-1.0..1.0f32))).collect();
+            (0..outputs / PANEL).map(|_| [0.0; PANEL].map(|_| rng.signed() as f32)).collect();
         let (x, before) = (rows(inputs, &mut rng), rows(outputs, &mut rng));
         let pairs = Pairs::new(token, inputs, &matrix);
         for (add, relu) in [(false, false), (true, false), (false, true), (true, true)] {
@@ -115,7 +113,7 @@ fn products_are_sums_of_rounded_factors() {
 #[test]
 fn outer_products_are_sums_of_rounded_factors() {
     let Some(token) = token() else { return };
-    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let mut rng = Stream::from_seed(2);
     // less than a tile of inputs, tiles and some more, several parts; outputs that fill a panel and that do not
     for (inputs, outputs) in [(3, 32), (21, 40), (128, 128), (301, 32)] {
         let (x, g) = (rows(inputs, &mut rng), rows(outputs, &mut rng));

@@ -1,12 +1,11 @@
 use super::*;
-use chacha20::ChaCha8Rng;
-use rand::SeedableRng;
+use crate::random::Stream;
 
 /// Codes with known statistics: c₁ = r·e^{iα} turned by a random angle, c₂ = i c₁/2 + noise, z = (3, −1) ± .
 fn codes(count: usize, seed: u64) -> Vec<Latent> {
-    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    let rng = &mut Stream::from_seed(seed);
     let mut code = || {
-        let ([a, b], [c, d], [e, f]) = (normal::pair(rng), normal::pair(rng), normal::pair(rng));
+        let ([a, b], [c, d], [e, f]) = (rng.normals(), rng.normals(), rng.normals());
         let second = [-0.5 * b + 0.2 * c, 0.5 * a + 0.2 * d];
         let vectors = vec![[a, b, 3.0 + e], [second[0], second[1], -1.0 + 0.5 * e + 0.1 * f]];
         let vectors = vectors.into_iter().map(|v| v.map(|x| x as f32)).collect();
@@ -44,7 +43,7 @@ fn moments(codes: &[Latent]) -> Vec<f64> {
 #[test]
 fn samples_have_the_fitted_statistics() {
     let prior = Prior::fit(&codes(20_000, 1), None).unwrap();
-    let rng = &mut ChaCha8Rng::seed_from_u64(2);
+    let rng = &mut Stream::from_seed(2);
     let samples: Vec<_> = (0..40_000).map(|_| Latent::sample(&prior, rng)).collect();
     let expected = [0.0, -1.0, 2.0, 0.58, 0.5, 3.0, -1.0, 2.0, 0.625, 0.0, 0.0, 0.0];
     for (i, (ours, truth)) in moments(&samples).iter().zip(expected).enumerate() {

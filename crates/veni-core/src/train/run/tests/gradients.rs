@@ -55,7 +55,7 @@ fn gradients_match(run: &Path, config: TrainConfig) {
     for (slot, (name, gradient)) in (0..).zip(&gradients) {
         // along the gradient, where the slope is large, and a random direction, so that no component hides
         let mut rng = stream(5, Purpose::Fit, 0, slot);
-        let random: Vec<f64> = gradient.data.iter().map(|_| veni_light::random::normal(&mut rng)).collect();
+        let random: Vec<f64> = gradient.data.iter().map(|_| rng.normal()).collect();
         let gradient: Vec<f64> = gradient.data.iter().map(|g| f64::from(*g)).collect();
         let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-30);
         let (a, b) = (length(&gradient), length(&random));

@@ -1,6 +1,7 @@
 //! The kernels that train the decoder against its tensor operations.
 
 use super::*;
+use veni_light::random::Stream;
 
 /// Sizes at which blocks, panels and chunks are full, short and several: hidden, layers, latent vectors, rays.
 const SIZES: [[usize; 4]; 4] = [[16, 2, 4, 32], [20, 1, 3, 7], [64, 3, 30, 500], [128, 2, 9, 1100]];
@@ -8,7 +9,7 @@ const SIZES: [[usize; 4]; 4] = [[16, 2, 4, 32], [20, 1, 3, 7], [64, 3, 30, 500],
 fn setup([hidden, layers, n, rays]: [usize; 4]) -> (Decoder, Tensor<3>, Tensor<3>) {
     let device = Device::flex().autodiff();
     let config = DecoderConfig { hidden, layers, heads: 2, ..DecoderConfig::default() };
-    let decoder = Decoder::new(&config, n, &mut ChaCha8Rng::seed_from_u64(3), &device);
+    let decoder = Decoder::new(&config, n, &mut Stream::from_seed(3), &device);
     // away from 0 and 1, where a mistake in a norm's gain or offset would not show
     let mut all = weights::read(&decoder, "");
     for (name, weight) in &mut all {
@@ -125,7 +126,7 @@ fn a_network_that_does_not_fold_is_refused_by_name() {
         heads: 2,
         ..DecoderConfig::default()
     };
-    let decoder = Decoder::new(&config, N, &mut ChaCha8Rng::seed_from_u64(3), &device);
+    let decoder = Decoder::new(&config, N, &mut Stream::from_seed(3), &device);
     let error = decoder.native(latent(&device)).unwrap_err().to_string();
     assert!(error.contains("tokens"), "{error}");
 }

@@ -1,14 +1,14 @@
 //! The systems that the paper's network is compared with.
 
 use super::*;
-use veni_light::random::{Purpose, stream};
-use veni_light::model::{
-    Conditioning, Encoding, Equivariance, Invariance, Model, ModelConfig, ModelInfo, OutputForm,
-};
 use crate::vae::decoder::TokenLayer;
 use crate::vae::decoder::layer::perceptron;
 use crate::vae::veni::model_of;
 use burn::tensor::activation::softmax;
+use veni_light::model::{
+    Conditioning, Encoding, Equivariance, Invariance, Model, ModelConfig, ModelInfo, OutputForm,
+};
+use veni_light::random::{Purpose, Stream, stream};
 
 const CONDITIONINGS: [Conditioning; 4] =
     [Conditioning::Attention, Conditioning::Film, Conditioning::Concat, Conditioning::Tokens];
@@ -43,7 +43,7 @@ fn systems() -> Vec<DecoderConfig> {
 }
 
 fn build(config: &DecoderConfig, device: &Device) -> Decoder {
-    Decoder::new(config, N, &mut ChaCha8Rng::seed_from_u64(7), device)
+    Decoder::new(config, N, &mut Stream::from_seed(7), device)
 }
 
 fn name(config: &DecoderConfig) -> String {

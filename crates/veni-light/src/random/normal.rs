@@ -1,23 +1,18 @@
 //! Normal deviates whose bits do not depend on the platform's mathematics library.
 
-use rand::Rng;
+use super::Stream;
 
 /// Standard normal deviates by Marsaglia's polar method, two at a time. Only IEEE-exact operations are used
 /// (the logarithm is ours), so a seed means the same sky on every machine.
-pub(super) fn pair<R: Rng + ?Sized>(rng: &mut R) -> [f64; 2] {
+pub(super) fn pair(rng: &mut Stream) -> [f64; 2] {
     loop {
-        let [u, v] = [uniform(rng), uniform(rng)];
+        let [u, v] = [rng.signed(), rng.signed()];
         let square = u * u + v * v;
         if square > 0.0 && square < 1.0 {
             let factor = (-2.0 * ln(square) / square).sqrt();
             return [u * factor, v * factor];
         }
     }
-}
-
-/// Uniform in [−1, 1), 53 bits.
-fn uniform<R: Rng + ?Sized>(rng: &mut R) -> f64 {
-    (rng.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
 /// Natural logarithm of a normal positive number: x = m·2ᵉ with m in [√½, √2), ln m = 2 artanh((m−1)/(m+1)).
@@ -39,8 +34,6 @@ fn ln(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use chacha20::ChaCha8Rng;
-    use rand::SeedableRng;
 
     #[test]
     fn logarithm_is_accurate() {
@@ -53,7 +46,7 @@ mod tests {
 
     #[test]
     fn moments_are_those_of_a_normal() {
-        let rng = &mut ChaCha8Rng::seed_from_u64(3);
+        let rng = &mut Stream::from_seed(3);
         let values: Vec<f64> = (0..100_000).flat_map(|_| pair(rng)).collect();
         let moment = |k: i32| values.iter().map(|v| v.powi(k)).sum::<f64>() / values.len() as f64;
         // four standard errors: the variance of xᵏ is E x²ᵏ − (E xᵏ)²
