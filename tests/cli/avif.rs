@@ -4,7 +4,7 @@ use crate::util::Dir;
 
 /// 64 × 32: red grows along the rows, green down the columns.
 const PICTURE: &[u8] =
-    include_bytes!("../../crates/veni-core/src/panorama/read/avif/files/8-bit-420-bt601-limited.avif");
+    include_bytes!("../../crates/veni-image/src/read/avif/files/8-bit-420-bt601-limited.avif");
 
 fn folder() -> Dir {
     let dir = Dir::new();

@@ -25,8 +25,8 @@ mod inspect;
 #[cfg(feature = "learn")]
 mod large_sets;
 #[cfg(feature = "onnx")]
-#[path = "../../crates/veni-core/src/panorama/expand/network/onnx_file.rs"]
-#[allow(dead_code, reason = "veni-core's tests use the rest of it")]
+#[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
+#[allow(dead_code, reason = "veni-data's tests use the rest of it")]
 mod onnx_file;
 #[cfg(feature = "learn")]
 mod prepare;
