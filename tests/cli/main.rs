@@ -13,6 +13,8 @@ mod crashes;
 mod encode;
 #[cfg(feature = "learn")]
 mod evaluate;
+#[cfg(feature = "pretrained")]
+mod embedded;
 mod expand_with;
 #[cfg(feature = "learn")]
 mod fit;

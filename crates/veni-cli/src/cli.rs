@@ -15,10 +15,10 @@ use crate::report::{Outcome, Report};
     about = "Natural light for renderers, from a learned prior of outdoor skies",
     long_about = format!("Natural light for renderers, from a learned prior of outdoor skies.\n\n\
         VENI turns an HDR environment map into a few vectors (a latent) that rotate with it, and a latent \
-        back into radiance for any direction. This tool bakes skies to image files, {}{}shows what is inside files \
-        and measures how fast this machine is.",
+        back into radiance for any direction. This tool bakes skies to image files, {}encodes panoramas, fits latents to \
+        panoramas, parts of them and photographs, {}shows what is inside files and measures how fast this machine is.",
         only(GPU, "on the graphics card if there is one, "),
-        only(LEARN, "encodes panoramas, fits latents to panoramas, parts of them and photographs, trains models, ")),
+        only(LEARN, "trains models, ")),
     after_help = format!("Results are printed on stdout, everything else on stderr.\n\
         Exit codes: 0 fine; 1 ran, but stopped early or the answer is no; 2 error.\n\n\
         Examples:\n  \
@@ -49,9 +49,7 @@ pub(crate) enum Command {
     Bake(commands::bake::Bake),
     Sample(commands::sample::Sample),
     Synth(commands::synth::Synth),
-    #[cfg(feature = "learn")]
     Encode(commands::encode::Encode),
-    #[cfg(feature = "learn")]
     Fit(commands::fit::Fit),
     Prepare(commands::prepare::Prepare),
     RenderProbe(commands::render_probe::RenderProbe),
@@ -72,9 +70,7 @@ impl Command {
             Self::Bake(c) => c.run(report),
             Self::Sample(c) => c.run(report),
             Self::Synth(c) => c.run(report),
-            #[cfg(feature = "learn")]
             Self::Encode(c) => c.run(report),
-            #[cfg(feature = "learn")]
             Self::Fit(c) => c.run(report),
             Self::Prepare(c) => c.run(report),
             Self::RenderProbe(c) => c.run(report),

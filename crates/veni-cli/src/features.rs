@@ -1,6 +1,6 @@
 //! What this build can do, for texts that must not promise more.
 
-/// Whether it learns: `encode`, `fit`, `evaluate` and `train`.
+/// Whether it learns: `evaluate` and `train`.
 pub(crate) const LEARN: bool = cfg!(feature = "learn");
 /// Whether it can use graphics devices.
 pub(crate) const GPU: bool = cfg!(feature = "gpu");

@@ -12,7 +12,6 @@ mod cli;
 mod commands;
 mod device;
 mod features;
-#[cfg(feature = "learn")]
 mod latent_files;
 mod numbers;
 mod output;

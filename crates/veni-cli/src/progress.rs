@@ -50,7 +50,6 @@ impl Bars {
     }
 
     /// `done` units are done in all.
-    #[cfg(any(feature = "learn", test))]
     pub(crate) fn advance(&self, done: u64, message: &str) {
         if let Some(work) = self.current().as_mut() {
             work.advance(done, message);

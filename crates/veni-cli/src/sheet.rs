@@ -30,7 +30,6 @@ impl Sheet {
     }
 
     /// A single cell without a border.
-    #[cfg(feature = "learn")]
     pub(crate) fn plain(width: usize, height: usize) -> Self {
         Self { gap: 0, cell: [width, height], width, height, pixels: vec![BACKGROUND; width * height] }
     }

@@ -1,12 +1,10 @@
 //! Where a model and a latent come from: whatever a user may name for them.
 
-#[cfg(feature = "learn")]
 mod encoding;
 mod image;
 mod latent;
 mod model;
 
-#[cfg(feature = "learn")]
 pub(crate) use encoding::{Encoded, Encoding};
 pub(crate) use image::panorama;
 pub(crate) use latent::{from_file, is_latent, model_of, seeded};

@@ -9,7 +9,6 @@ use crate::fit::FitDecoder;
 use veni_light::latent::{Latent, Prior};
 use veni_light::model::{Model, ModelKind};
 use veni_light::sphere::{Equirect, Stripes};
-use crate::vae::weights;
 use crate::vae::{Decoder, Veni, veni};
 use crate::{Error, Result};
 
@@ -48,7 +47,7 @@ impl LoadedModel {
         let decoder = if model.has_encoder() {
             Decoding::Whole { veni: Box::new(Veni::from_model(&model, device)?), field }
         } else {
-            Decoding::Alone { network: Box::new(decoder_alone(&model, device)?), field }
+            Decoding::Alone { network: Box::new(Decoder::from_model(&model, device)?), field }
         };
         Ok(Self {
             name: name.into(),
@@ -182,12 +181,4 @@ impl LoadedModel {
         let (count, rest) = data.split_once(' ')?;
         count.parse().ok().filter(|_| rest.starts_with("panorama"))
     }
-}
-
-fn decoder_alone(model: &Model, device: &Device) -> Result<Decoder> {
-    // every weight is replaced; the generator's only part is to give them a shape
-    let mut rng: chacha20::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
-    let decoder = Decoder::new(&model.config().decoder, model.latent_vectors(), &mut rng, device);
-    let tensors = model.tensors().iter().filter(|(name, _)| name.starts_with("decoder."));
-    weights::write(decoder, "decoder", &tensors.map(|(name, t)| (name.clone(), t.clone())).collect())
 }

@@ -4,6 +4,8 @@ mod houses;
 mod lamps;
 mod plants;
 mod rocks;
+#[cfg(test)]
+mod tests;
 
 use glam::{Vec2, Vec3};
 

@@ -155,3 +155,84 @@ fn slope(ridge: &Ridge, flat: Vec2, z: f32, height: f32, footprint: f32) -> Slop
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KINDS: [RidgeKind; 4] = [RidgeKind::Hills, RidgeKind::Mountains, RidgeKind::Trees, RidgeKind::Town];
+
+    fn ridge(kind: RidgeKind, distance: f32, gaps: f32, seed: u32) -> Ridge {
+        let (height, relief, surface, snow_line) = (40.0, 0.5, Surface::Grass, f32::INFINITY);
+        Ridge { kind, distance, height, relief, surface, gaps, snow_line, seed }
+    }
+
+    fn around(count: usize) -> impl Iterator<Item = Vec2> {
+        (0..count).map(move |k| Vec2::from_angle(TURN * k as f32 / count as f32))
+    }
+
+    const TURN: f32 = std::f32::consts::TAU;
+
+    #[test]
+    fn heights_vary_about_their_mean_within_twice_the_relief_and_close_the_circle() {
+        for kind in KINDS {
+            let (mut mean, mut different) = (0.0, 0);
+            for seed in 0..20 {
+                let ridge = ridge(kind, 800.0, 0.0, seed);
+                let heights: Vec<_> = around(720).map(|flat| profile(&ridge, flat, 0.0)).collect();
+                // 1 ± 2 · 0.5 of 40 m
+                assert!(heights.iter().all(|h| (0.0..=80.0).contains(h)), "{kind:?}, seed {seed}");
+                mean += heights.iter().sum::<f32>() / 720.0 / 20.0;
+                let spread = heights.iter().fold(0f32, |m, h| m.max((h - heights[0]).abs()));
+                different += usize::from(spread > 4.0);
+                // no seam where the azimuth jumps from 180° to −180°; houses have edges everywhere
+                let [a, b] = [-1e-4f32, 1e-4].map(|y| profile(&ridge, Vec2::new(-1.0, y).normalize(), 0.0));
+                assert!((a - b).abs() < 1.0 || kind == RidgeKind::Town, "{kind:?}, seed {seed}: {a} and {b}");
+            }
+            println!("CAL {kind:?} mean {mean} different {different}");
+        }
+    }
+
+    #[test]
+    fn gaps_are_the_share_of_the_horizon_that_is_open() {
+        for kind in [RidgeKind::Trees, RidgeKind::Town] {
+            for gaps in [0.0, 0.3, 0.7, 1.0] {
+                let mut standing = 0;
+                for seed in 0..20 {
+                    let ridge = ridge(kind, 300.0, gaps, seed);
+                    standing += around(360).filter(|flat| profile(&ridge, *flat, 0.0) > 4.0).count();
+                }
+                println!("CAL {kind:?} gaps {gaps}: {}", standing as f32 / 7200.0);
+            }
+        }
+    }
+
+    #[test]
+    fn rays_end_on_the_nearest_ridge_that_is_high_enough() {
+        for kind in KINDS {
+            let (near, far) = (ridge(kind, 500.0, 0.0, 1), ridge(RidgeKind::Hills, 2000.0, 0.0, 2));
+            let far = Ridge { height: 400.0, ..far };
+            // in any order
+            let ridges = Ridges::new(vec![far, near]);
+            for flat in around(90) {
+                let eye = 2.0;
+                let towards = |z: f32, distance: f32| (flat * distance).extend(z - eye).normalize();
+                let top = profile(&near, flat, 0.0);
+                if top > 1.0 {
+                    let slope = ridges.first(eye, towards(0.9 * top, 500.0), f32::INFINITY, 0.0).unwrap();
+                    // slopes lean back by 0.3 of their height at most
+                    assert!((500.0..=650.0).contains(&slope.distance), "{kind:?}: {slope:?}");
+                    assert!((slope.normal.length() - 1.0).abs() < 1e-5);
+                    assert!(slope.albedo.min_element() >= 0.0 && slope.albedo.max_element() < 0.95, "{slope:?}");
+                    // and not where the ground is nearer
+                    assert!(ridges.first(eye, towards(0.9 * top, 500.0), 400.0, 0.0).is_none());
+                }
+                // over the near one
+                let above = (1.01 * top).max(0.5);
+                let over = ridges.first(eye, towards(above, 500.0), f32::INFINITY, 0.0);
+                assert!(over.is_none_or(|s| s.distance >= 2000.0), "{kind:?}: {over:?}");
+                assert!(ridges.first(eye, Vec3::Z, f32::INFINITY, 0.0).is_none());
+            }
+        }
+    }
+}

@@ -81,6 +81,110 @@ fn every_kind_of_scene_is_positive_and_finite() {
     assert!(ranges[0] > 1.0 && (4.0..14.0).contains(&ranges[count / 2]), "{ranges:?}");
 }
 
+/// Scenes of one weather on an empty plain, with the camera's white balance off.
+fn under(sky: SkyKind, count: u64) -> impl Iterator<Item = Scene> {
+    let fixed = Fixed { sky: Some(sky), place: Some(Place::Plain), ..Fixed::default() };
+    (0..count).map(move |index| {
+        let scene = Scene::draw(31, index, &fixed);
+        Scene { ridges: Vec::new(), fullness: 0.0, white: [1.0; 3], lit: false, ..scene }
+    })
+}
+
+#[test]
+fn the_light_of_every_weather_is_that_of_light_meters() {
+    for sky in SkyKind::ALL {
+        let mut all: Vec<_> = under(sky, 24)
+            .map(|scene| {
+                let panorama = render(&scene, SMALL);
+                let level = illuminance(&panorama, [0.0, 0.0, 1.0]);
+                let half = &panorama.pixels()[..SMALL.len() / 2];
+                let blue = half.iter().map(|p| p[2]).sum::<f32>() / half.iter().map(|p| p[0]).sum::<f32>();
+                let brightest = half.iter().map(|p| luminance(*p)).fold(0f32, f32::max);
+                (
+                    level,
+                    scene.sun_elevation,
+                    blue,
+                    brightest,
+                    level / f64::from(scene.sun_elevation.to_radians().sin()),
+                )
+            })
+            .collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        println!("CAL {sky:?} {all:.3?}");
+    }
+}
+
+#[test]
+fn every_place_shows_as_much_sky_as_its_name_says() {
+    for place in Place::ALL {
+        let fixed = Fixed { sky: Some(SkyKind::Cloudy), place: Some(place), ..Fixed::default() };
+        let mut shares: Vec<_> = (0..24)
+            .map(|index| {
+                let scene = Scene::draw(32, index, &fixed);
+                let stage = stage::Stage::new(&scene);
+                let open = sky::spiral(400).filter(|d| stage.is_clear(*d, f32::INFINITY)).count();
+                open as f32 / 400.0
+            })
+            .collect();
+        shares.sort_unstable_by(f32::total_cmp);
+        println!(
+            "CAL {place:?} {} {} {} mean {}",
+            shares[0],
+            shares[12],
+            shares[23],
+            shares.iter().sum::<f32>() / 24.0
+        );
+    }
+}
+
+#[test]
+fn the_sun_is_drawn_where_any_scene_says_it_is() {
+    let grid = Equirect::new(64, 32);
+    for k in 0..48 {
+        // every third of a turn and 7° more: no two at one place of a pixel
+        let (azimuth, elevation) = (127.0 * k as f32 % 360.0, 3.0 + 83.0 * k as f32 / 47.0);
+        let fixed = Fixed {
+            sky: Some(SkyKind::Clear),
+            place: Some(Place::PureSky),
+            sun_elevation: Some(elevation),
+            sun_azimuth: Some(azimuth),
+            cloud_cover: Some(0.0),
+            ..Fixed::default()
+        };
+        let scene = Scene::draw(33, k, &fixed);
+        let panorama = render(&scene, grid);
+        let brightness = |(_, p): &(usize, &[f32; 3])| luminance(**p);
+        let all = panorama.pixels().iter().enumerate();
+        let (at, _) = all.max_by(|a, b| brightness(a).total_cmp(&brightness(b))).unwrap();
+        // written out here, so that a wrong sense of azimuth anywhere is seen
+        let [column, row] =
+            [(180.0 - azimuth).rem_euclid(360.0) / 360.0 * 64.0, (90.0 - elevation) / 180.0 * 32.0];
+        let across = (at % 64) as f32 + 0.5 - column;
+        let across = (across + 32.0).rem_euclid(64.0) - 32.0;
+        let down = (at / 64) as f32 + 0.5 - row;
+        // half a pixel, and what of the disc of 0.27° lies beyond its border
+        let slack = 0.27 / 5.625 / elevation.to_radians().cos();
+        assert!(
+            across.abs() <= 0.5 + slack && down.abs() <= 0.55,
+            "{azimuth}°, {elevation}°: {across} {down}"
+        );
+        // the disc's energy in the pixels is that of the source
+        let stage = stage::Stage::new(&scene);
+        let mut pixels = vec![glam::Vec3::ZERO; grid.len()];
+        disc::add_discs(&stage, grid, &mut pixels);
+        let energy = pixels
+            .iter()
+            .enumerate()
+            .map(|(k, p)| f64::from(luminance(p.to_array())) * grid.solid_angle(k / 64));
+        let (energy, source) =
+            (energy.sum::<f64>(), f64::from(luminance(stage.sky.sources[0].clear.to_array())));
+        assert!(
+            (energy - source).abs() < 1e-3 * source,
+            "{azimuth}°, {elevation}°: {energy} of {source} klx"
+        );
+    }
+}
+
 #[test]
 fn the_sun_is_where_it_was_asked_for_with_its_energy_at_any_size() {
     let scene = clear(35.0);

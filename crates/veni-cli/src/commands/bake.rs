@@ -13,7 +13,7 @@ use veni_image::{Precision, WriteFormat, WriteOptions};
 
 use crate::args::{Decoding, Force};
 use crate::device::Device;
-use crate::features::{GPU, LEARN, only};
+use crate::features::{GPU, only};
 use crate::output::{self, with_remedy};
 use crate::picture::{FrameName, Layout, Picture, preview_tonemap};
 use crate::progress::Bars;
@@ -44,7 +44,7 @@ const DEVICES: &str = "Devices: a graphics card bakes the same picture as the CP
         Several skies, or --count random ones, go to --out-dir, each named after its file or seed.\n\n\
         Formats by extension: .exr (linear, half or float), .hdr (Radiance RGBE), .png (tonemapped preview). An \
         EXR or HDR file carries its latent and the model's hash, so that it can be baked again at any size.",
-        only(LEARN, "an HDR panorama (encoded on the fly), ")),
+        "an HDR panorama (encoded on the fly), "),
     after_help = format!("Cube maps: six square faces stacked from top to bottom in the order +X -X +Y -Y +Z -Z of --frame, \
         each oriented as the layers of a cube texture in Vulkan, Direct3D, Metal, OpenGL and WebGPU; the attribute \
         veni:cubeFaces repeats the order. With --frame bevy, z is negated before the lookup, as Bevy's shaders do. \
@@ -57,12 +57,11 @@ const DEVICES: &str = "Devices: a graphics card bakes the same picture as the CP
         veni-cli bake latents/*.json --out-dir skies --format exr,png\n  \
         veni-cli bake --seed 0 --count 1000 --out-dir skies --shard 2/4    the second of four processes{}",
         only(GPU, DEVICES),
-        only(LEARN, "veni-cli bake photo.hdr -o relit.exr                   through the encoder\n  "),
+        "veni-cli bake photo.hdr -o relit.exr                   through the encoder\n  ",
         only(GPU, "\n  veni-cli bake --seed 7 -o sky.exr --device cpu         the same bits whatever card there is"))
 )]
 pub(crate) struct Bake {
-    #[cfg_attr(feature = "learn", doc = "Latent files, baked images, or HDR panoramas")]
-    #[cfg_attr(not(feature = "learn"), doc = "Latent files, or baked images")]
+    /// Latent files, baked images, or HDR panoramas
     #[arg(group = "sky", value_name = "LATENT")]
     latents: Vec<PathBuf>,
 

@@ -2,6 +2,7 @@
 
 mod completed;
 mod input;
+mod model;
 mod settings;
 mod shaded;
 
@@ -12,12 +13,11 @@ use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
 use veni_image::metrics::{Alignment, Scores, scores};
-use veni_core::LoadedModel;
-use veni_core::fit::{Best, FitConfig, FitTarget, Observation, best_light, best_of, random_starts};
+use veni_fit::{Best, FitConfig, Observation, best_light, random_starts};
+use veni_image::Picture;
 use veni_light::latent::Latent;
 use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
-use veni_core::train::config::DeviceKind;
 
 use crate::args::{Force, ModelArgs};
 use crate::latent_files::{LatentFiles, source_of};
@@ -29,6 +29,7 @@ use crate::size::Size;
 use crate::source;
 
 pub(crate) use input::Input;
+use model::FitModel;
 use settings::{Settings, Start};
 use shaded::Shaded;
 
@@ -110,12 +111,9 @@ impl Fit {
         self.shard.note_idle(pictures.len(), report);
         self.settings.grid(false)?;
         let config = self.settings.config(self.shaded.normals.is_some())?;
-        let loaded = source::model(&self.model)?;
-        let device = DeviceKind::Flex.device()?;
-        let subject =
-            LoadedModel::new(&loaded.name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?;
+        let model = FitModel::new(source::model(&self.model)?)?;
         report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
-            self.one(path, outputs.get(at), &subject, &config, report)
+            self.one(path, outputs.get(at), &model, &config, report)
         })
     }
 
@@ -148,27 +146,27 @@ impl Fit {
         &self,
         path: &Path,
         output: Option<&PathBuf>,
-        subject: &LoadedModel,
+        model: &FitModel,
         config: &FitConfig,
         report: Report,
     ) -> Result<()> {
         let overwrite = Overwrite::from(self.force);
         let picture = self.input.read(path, report)?;
         let mut fitted = match &self.shaded.normals {
-            Some(normals) => self.fit_light(path, normals, &picture, subject, config, report)?,
+            Some(normals) => self.fit_light(path, normals, &picture, model, config, report)?,
             None => {
                 let grid = self.settings.grid(picture.is_partial())?;
                 let observation = self.input.observe(&picture, grid).map_err(|e| e.in_file(path))?;
-                self.fit(path, observation, subject, config, report)?
+                self.fit(path, observation, model, config, report)?
             }
         };
         fitted.best.latent.source = Some(source_of(path));
-        fitted.best.latent.model = Some(subject.model().hash());
+        fitted.best.latent.model = Some(model.hash());
         if let Some(output) = output {
             fitted.best.latent.save(output, overwrite).map_err(with_remedy)?;
         }
         let images = completed::Images {
-            subject,
+            model,
             picture: &picture,
             view: self.input.view(),
             is_seen: self.shaded.normals.is_none(),
@@ -188,29 +186,27 @@ impl Fit {
         &self,
         path: &Path,
         observation: Observation,
-        subject: &LoadedModel,
+        model: &FitModel,
         config: &FitConfig,
         report: Report,
     ) -> Result<Fitted> {
         let started = Instant::now();
         let partial = observation.is_partial();
-        let starts = self.starts(path, &observation, subject)?;
+        let starts = self.starts(path, &observation, model)?;
         self.check_starts(starts.len())?;
-        let vectors = subject.latent_vectors();
+        let vectors = model.latent_vectors();
         let config = self.settings.adapted(*config, partial, vectors);
-        let (total, prior) = (config.most_updates(vectors) * starts.len() as u64, subject.prior());
+        let (total, prior) = (config.most_updates(vectors) * starts.len() as u64, model.prior());
         let bars = Bars::new(report);
         bars.begin("", "step", Some(total));
-        let best = observation.with_target(|target| {
-            let target = FitTarget { prior: Some(&prior), ..target.clone() };
-            best_of(subject.fit_decoder(), &target, &starts, &config, &mut |step, loss| {
-                bars.advance(step, &format!("loss {loss:.4}"));
-            })
+        let target = observation.target().with_prior(&prior);
+        let best = model.best_of(&target, &starts, &config, &mut |step, loss| {
+            bars.advance(step, &format!("loss {loss:.4}"));
         });
         bars.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         let scores = match (partial, observation.clipped.is_some()) {
-            (false, false) => Some(score(subject, &best.latent, &observation)?),
+            (false, false) => Some(score(model, &best.latent, &observation)?),
             _ => None,
         };
         // from the image's exposure 0 to its own
@@ -226,8 +222,8 @@ impl Fit {
         &self,
         path: &Path,
         normals: &Path,
-        picture: &input::Read,
-        subject: &LoadedModel,
+        picture: &Picture,
+        model: &FitModel,
         config: &FitConfig,
         report: Report,
     ) -> Result<Fitted> {
@@ -236,7 +232,7 @@ impl Fit {
         let image = self.shaded.image(normals, self.input.mask(), picture, view)?;
         let config = self.settings.for_light(*config);
         let (start, count) = self.settings.start(false, false);
-        let n = subject.latent_vectors();
+        let n = model.latent_vectors();
         let first = match start {
             Start::Noise => None,
             Start::Zero => Some(Latent::new(vec![[0.0; 3]; n])),
@@ -246,15 +242,15 @@ impl Fit {
             ),
         };
         let rest = count - usize::from(first.is_some());
-        let random = random_starts(&subject.prior(), 0.0, rest, self.settings.seed());
+        let random = random_starts(&model.prior(), 0.0, rest, self.settings.seed());
         let mut starts: Vec<_> = first.into_iter().chain(random).collect();
         self.check_starts(starts.len())?;
-        self.shaded.exposed(&image, picture, subject, &mut starts)?;
-        let prior = subject.prior();
+        self.shaded.exposed(&image, picture, model, &mut starts)?;
+        let prior = model.prior();
         let bars = Bars::new(report);
         bars.begin("", "step", Some(config.steps * starts.len() as u64));
         let mut watch = |step, loss| bars.advance(step, &format!("loss {loss:.4}"));
-        let best = best_light(subject.fit_decoder(), &image, Some(&prior), &starts, &config, &mut watch);
+        let best = best_light(model.decoder(), &image, Some(&prior), &starts, &config, &mut watch);
         bars.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         for latent in best.all.iter_mut().chain([&mut best.latent]) {
@@ -274,11 +270,11 @@ impl Fit {
     }
 
     /// The latents to start from, at the exposure that the observation was brought to.
-    fn starts(&self, path: &Path, observation: &Observation, subject: &LoadedModel) -> Result<Vec<Latent>> {
+    fn starts(&self, path: &Path, observation: &Observation, model: &FitModel) -> Result<Vec<Latent>> {
         let whole = !observation.is_partial();
-        let has_encoder = subject.model().has_encoder();
+        let has_encoder = model.has_encoder();
         let (start, count) = self.settings.start(whole, has_encoder);
-        let n = subject.latent_vectors();
+        let n = model.latent_vectors();
         let first = match start {
             Start::Noise => None,
             Start::Zero => Some(Latent::new(vec![[0.0; 3]; n])),
@@ -287,14 +283,14 @@ impl Fit {
                 path.display()
             ),
             Start::Encoder if !has_encoder => {
-                bail!("{}: this model has no encoder: use --start zero or noise", subject.name())
+                bail!("{}: this model has no encoder: use --start zero or noise", model.name())
             }
             Start::Encoder => {
-                subject.encode(observation.grid, &[&observation.log_radiance])?.into_iter().next()
+                model.encode(observation.grid, &observation.log_radiance)?
             }
         };
         let rest = count - usize::from(first.is_some());
-        let random = random_starts(&subject.prior(), 0.0, rest, self.settings.seed());
+        let random = random_starts(&model.prior(), 0.0, rest, self.settings.seed());
         Ok(first.into_iter().chain(random).collect())
     }
 
@@ -340,8 +336,8 @@ impl Fit {
 }
 
 /// The article's protocol, on the pixels that were fitted.
-fn score(subject: &LoadedModel, latent: &Latent, seen: &Observation) -> Result<Scores> {
+fn score(model: &FitModel, latent: &Latent, seen: &Observation) -> Result<Scores> {
     let Equirect { width, height } = seen.grid;
-    let decoded = subject.decode(seen.grid, std::slice::from_ref(latent))?.concat();
+    let decoded = model.decode(seen.grid, latent)?;
     Ok(scores(&decoded, &seen.log_radiance, height, width, Alignment::LogFactor))
 }

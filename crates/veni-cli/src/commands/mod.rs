@@ -3,11 +3,9 @@
 pub(crate) mod bake;
 pub(crate) mod bench;
 pub(crate) mod completions;
-#[cfg(feature = "learn")]
 pub(crate) mod encode;
 #[cfg(feature = "learn")]
 pub(crate) mod evaluate;
-#[cfg(feature = "learn")]
 pub(crate) mod fit;
 pub(crate) mod inspect;
 pub(crate) mod man;

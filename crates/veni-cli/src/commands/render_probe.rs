@@ -17,7 +17,6 @@ use veni_fit::shade::{Camera, Colour, Lights, Material, ShadingForm, Surface, Tr
 use veni_light::sphere::Equirect;
 
 use crate::args::{Force, ModelArgs};
-use crate::features::{LEARN, only};
 use crate::numbers::{albedo, elevation, finite, fraction, lights, shininess};
 use crate::output::{self, CAMERA, MATERIAL, with_remedy};
 use crate::report::{self, Outcome, Report};
@@ -39,7 +38,7 @@ const PLAIN: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
         --seed. The surface is Lambertian, or Blinn-Phong with --ks. Radiance is physically right: the sum over the \
         light's pixels of reflectance x radiance x cosine x solid angle. Every pixel sees the whole sky: there are no \
         shadows and no interreflections, as in the article.{}",
-        only(LEARN, "\n\nWith --normals and --mask this makes the inputs from which 'veni-cli fit' recovers the light.")),
+        "\n\nWith --normals and --mask this makes the inputs from which 'veni-cli fit' recovers the light."),
     after_help = "World: z up; the middle of a panorama lies at +x, its right at -y. The camera looks along --azimuth, which \
         turns from +x to +y, and is raised by --elevation; it frames the sphere or mesh whole. Normals are unit vectors \
         of this world, x y z in R G B, 0 where there is no surface; the attribute veni:camera of both EXR files holds \

@@ -9,8 +9,7 @@ use veni_light::field::Field;
 use veni_light::latent::Latent;
 use veni_image::Panorama;
 use veni_light::sphere::Equirect;
-use veni_core::train::config::DeviceKind;
-use veni_core::vae::Veni;
+use veni_fit::Encoder;
 
 use super::image::panorama;
 use super::model::Loaded;
@@ -31,7 +30,7 @@ pub(crate) struct Encoded {
 /// A model's encoder, ready.
 pub(crate) struct Encoding<'a> {
     loaded: &'a Loaded,
-    veni: Veni,
+    encoder: Encoder,
 }
 
 impl<'a> Encoding<'a> {
@@ -42,9 +41,8 @@ impl<'a> Encoding<'a> {
                 loaded.name
             );
         }
-        let veni = Veni::from_model(&loaded.model, &DeviceKind::Flex.device()?)
-            .map_err(|e| e.in_file(&loaded.name))?;
-        Ok(Self { loaded, veni })
+        let encoder = Encoder::new(&loaded.model).map_err(|e| e.in_file(&loaded.name))?;
+        Ok(Self { loaded, encoder })
     }
 
     /// Reads, encodes, and decodes again to compare.
@@ -53,7 +51,7 @@ impl<'a> Encoding<'a> {
         let grid = Equirect::new(GRID[0], GRID[1]);
         let item = Item::new(path, &panorama, grid);
         let encoded =
-            self.veni.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
+            self.encoder.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
         let vectors = encoded.into_iter().next().map(|e| e.vectors).unwrap_or_default();
         let latent = Latent {
             vectors,

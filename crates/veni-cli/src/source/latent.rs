@@ -100,18 +100,9 @@ fn inside(_: &Latent) -> Option<usize> {
     None
 }
 
-#[cfg(feature = "learn")]
 fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
     report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
     super::encoding::Encoding::new(loaded)?.encode_file(path, report).map(|e| e.latent)
-}
-
-#[cfg(not(feature = "learn"))]
-fn encode(path: &Path, _: &Loaded, _: Report) -> Result<Latent> {
-    bail!(
-        "{}: no latent inside, and this build cannot encode panoramas (it lacks the feature `learn`)",
-        path.display()
-    )
 }
 
 /// Whether a file is a latent, and not an image: JSON is a latent; everything else is left to the image readers, which say what

@@ -1,9 +1,7 @@
 //! OpenEXR as scan lines in increasing order with ZIP compression, blocks compressed on all cores.
 
-use std::collections::HashMap;
 use std::fs::File;
-use std::hash::RandomState;
-use std::io::BufWriter;
+use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use exr::block::writer::ChunksWriter;
@@ -20,8 +18,8 @@ use rayon::prelude::*;
 
 use super::{Accept, HalfRange, Precision, RADIANCE_SCALE, SOFTWARE, WriteOptions};
 use crate::colour::REC709;
-use veni_light::sphere::Equirect;
 use crate::{Error, Result};
+use veni_light::sphere::Equirect;
 
 /// The largest finite half.
 pub(super) const HALF_MAX: f64 = 65504.0;
@@ -48,9 +46,10 @@ pub(super) fn write(
         }
     };
     let header = header(grid, precision, factor, options)?;
+    let attributes = attributes(&header).map_err(|e| wrap(e, path))?;
     // the closure below can only return the exr crate's own error
     let mut failure = None;
-    let written = exr::block::write(file, [header].into_iter().collect(), true, |meta, writer| {
+    let written = exr::block::write(&mut *file, [header].into_iter().collect(), true, |meta, writer| {
         let blocks = (2 * rayon::current_num_threads()).clamp(4, 64);
         let mut pending: Vec<[f32; 3]> = Vec::new();
         let mut row = 0;
@@ -75,7 +74,11 @@ pub(super) fn write(
     match (failure, written) {
         (Some(error), _) => Err(error),
         (None, Err(error)) => Err(wrap(error, path)),
-        (None, Ok(())) => Ok(()),
+        // the same bytes in another order
+        (None, Ok(())) => file
+            .seek(SeekFrom::Start(PREFIX))
+            .and_then(|_| file.write_all(&attributes))
+            .map_err(|e| Error::io(path, "write", e)),
     }
 }
 
@@ -104,7 +107,6 @@ fn header(grid: Equirect, precision: Precision, factor: f32, options: &WriteOpti
     if factor != 1.0 {
         attributes.other.insert(text(RADIANCE_SCALE)?, AttributeValue::Text(text(&factor.to_string())?));
     }
-    attributes.other = in_order(&attributes.other);
     let mut header =
         Header::new(Text::from(""), Vec2(grid.width, grid.height), channels.into_iter().collect())
             .with_attributes(attributes)
@@ -114,19 +116,21 @@ fn header(grid: Equirect, precision: Precision, factor: f32, options: &WriteOpti
     Ok(header)
 }
 
-/// How often a map is drawn: on average k! draws bring k attributes into order, so this serves six or seven.
-const DRAWS: usize = 20_000;
+/// Bytes in front of the attributes: magic number and version.
+const PREFIX: u64 = 8;
 
-/// The exr crate keeps attributes in a hash map and writes them in its order, which is random. Maps are drawn until
-/// the order is alphabetical, so that the same image gives the same file; with more attributes than ours only their
-/// order varies.
-fn in_order(attributes: &HashMap<Text, AttributeValue>) -> HashMap<Text, AttributeValue> {
-    // names alone are cheap to try; a map with the same hasher, filled in the same way, has the same order
-    let names = || attributes.keys().map(|name| (name.clone(), ()));
-    let hasher = (0..DRAWS).map(|_| names().collect::<HashMap<_, _>>()).find(|map| map.keys().is_sorted());
-    let mut ordered = HashMap::with_hasher(hasher.map_or_else(RandomState::new, |map| map.hasher().clone()));
-    ordered.extend(attributes.iter().map(|(name, value)| (name.clone(), value.clone())));
-    ordered
+/// The attributes of `header` as a file holds them: those of the format in the exr crate's order, then the others by
+/// name. The crate keeps those in a hash map and writes them in its order, which differs from process to process.
+fn attributes(header: &Header) -> exr::error::Result<Vec<u8>> {
+    let mut all: Vec<_> = header.all_named_attributes().collect();
+    let others = &header.own_attributes.other;
+    // the sort is stable: what is not among the others keeps its place
+    all.sort_by_key(|(name, _)| others.get_key_value(*name).map(|(name, _)| name));
+    let mut bytes = Vec::new();
+    for (name, value) in all {
+        exr::meta::attribute::write(name, &value, &mut bytes)?;
+    }
+    Ok(bytes)
 }
 
 /// EXR text is bytes without an encoding; UTF-8 is what other software expects.

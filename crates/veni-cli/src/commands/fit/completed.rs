@@ -3,15 +3,14 @@
 use std::path::Path;
 
 use anyhow::Result;
-use veni_core::LoadedModel;
-use veni_core::fit::Best;
+use veni_fit::Best;
 use veni_light::latent::Latent;
 use veni_light::output::Overwrite;
 use veni_image::tonemap::Tonemap;
-use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
+use veni_image::{Panorama, Picture, Precision, WriteFormat, WriteOptions};
 use veni_light::sphere::{Equirect, View};
 
-use super::input::Read;
+use super::model::FitModel;
 use crate::output::with_remedy;
 use crate::sheet::Sheet;
 use crate::size::Size;
@@ -23,8 +22,8 @@ const HOT: f32 = std::f32::consts::LN_2;
 
 /// What the images are made from.
 pub(super) struct Images<'a> {
-    pub(super) subject: &'a LoadedModel,
-    pub(super) picture: &'a Read,
+    pub(super) model: &'a FitModel,
+    pub(super) picture: &'a Picture,
     pub(super) view: Option<View>,
     /// Whether the picture shows the panorama, or a surface lit by it.
     pub(super) is_seen: bool,
@@ -39,7 +38,7 @@ impl Images<'_> {
                 let (width, height) = size.equirect()?;
                 [width, height]
             }
-            (None, None) if self.is_seen => self.picture.size,
+            (None, None) if self.is_seen => self.picture.size(),
             _ => GRID,
         };
         Ok(Equirect::new(width, height))
@@ -48,7 +47,7 @@ impl Images<'_> {
     /// What is known as it is, the rest from the latent.
     pub(super) fn completed(&self, path: &Path, latent: &Latent) -> Result<()> {
         let grid = self.grid()?;
-        let decoded = self.subject.decode(grid, std::slice::from_ref(latent))?.concat();
+        let decoded = self.model.decode(grid, latent)?;
         let mut pixels: Vec<_> = decoded.as_chunks::<3>().0.iter().map(|p| p.map(f32::exp)).collect();
         if !self.is_seen {
             return self.write(path, &Panorama::new(grid, pixels));
@@ -64,13 +63,13 @@ impl Images<'_> {
 
     /// How much of each pixel is known, and its radiance there.
     fn seen(&self, grid: Equirect) -> (Vec<f32>, Vec<[f32; 3]>) {
-        let [width, height] = self.picture.size;
+        let [width, height] = self.picture.size();
         let known = |p: usize| {
-            let finite = self.picture.pixels[p].iter().all(|v| v.is_finite());
-            if finite { self.picture.known.as_ref().map_or(1.0, |k| k[p].clamp(0.0, 1.0)) } else { 0.0 }
+            let finite = self.picture.pixels()[p].iter().all(|v| v.is_finite());
+            if finite { self.picture.known().map_or(1.0, |k| k[p].clamp(0.0, 1.0)) } else { 0.0 }
         };
         let known: Vec<f32> = (0..width * height).map(known).collect();
-        let radiance = |p: usize| if known[p] > 0.0 { self.picture.pixels[p] } else { [0.0; 3] };
+        let radiance = |p: usize| if known[p] > 0.0 { self.picture.pixels()[p] } else { [0.0; 3] };
         if let Some(view) = &self.view {
             let at = |d: [f32; 3]| view.pixel_of(d, width, height);
             let hits: Vec<_> = grid.directions().into_iter().map(at).collect();
@@ -91,7 +90,7 @@ impl Images<'_> {
         let grid = self.grid()?;
         let (mut sum, mut squares) = (vec![0.0f64; 3 * grid.len()], vec![0.0f64; 3 * grid.len()]);
         for latent in &best.all {
-            let decoded = self.subject.decode(grid, std::slice::from_ref(latent))?.concat();
+            let decoded = self.model.decode(grid, latent)?;
             for (k, v) in decoded.iter().enumerate() {
                 sum[k] += f64::from(*v);
                 squares[k] += f64::from(*v).powi(2);

@@ -2,10 +2,11 @@
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use veni_core::fit::{FitConfig, Method, Objective, Plateau};
+use veni_fit::schedule::LearningRate;
+use veni_fit::{FitConfig, Method, Objective, Plateau};
 use veni_light::sphere::Equirect;
-use veni_core::train::loss::LossConfig;
-use veni_core::train::schedule::LearningRate;
+#[cfg(feature = "learn")]
+use veni_fit::loss::LossConfig;
 
 use crate::size::Size;
 
@@ -89,8 +90,19 @@ enum Preset {
     /// The article's helper: 2000 steps from 1e-2 to 2e-3, unweighted, without a prior
     Reference,
     /// RENI++'s evaluation: cosine and scale-invariant error, 2500 steps
+    #[cfg(feature = "learn")]
     #[value(name = "reni++")]
     Renipp,
+}
+
+impl Preset {
+    /// RENI++ has no encoder: its evaluation starts at 0.
+    fn starts_at_the_encoder(self) -> bool {
+        #[cfg(feature = "learn")]
+        return self != Self::Renipp;
+        #[cfg(not(feature = "learn"))]
+        true
+    }
 }
 
 /// The objectives by the names that are typed.
@@ -107,8 +119,10 @@ enum ObjectiveName {
     /// Squared error of log radiance, every pixel alike
     Reference,
     /// RENI++'s: cosine and scale-invariant error
+    #[cfg(feature = "learn")]
     CosineScale,
     /// The training losses of the article: gradients on several scales, scale-invariant error, colour
+    #[cfg(feature = "learn")]
     Training,
 }
 
@@ -154,6 +168,7 @@ impl Settings {
             Preset::Display => FitConfig { plateau: Some(PLATEAU), ..FitConfig::display() },
             Preset::Energy => FitConfig { plateau: Some(PLATEAU), ..FitConfig::energy() },
             Preset::Reference => FitConfig::reference_helper(1e-2, 2e-3, 2000),
+            #[cfg(feature = "learn")]
             Preset::Renipp => FitConfig::reni_evaluation(),
         };
         if let Some(steps) = self.steps {
@@ -186,7 +201,9 @@ impl Settings {
                 ObjectiveName::Display => FitConfig::display().objective,
                 ObjectiveName::Energy => FitConfig::energy().objective,
                 ObjectiveName::Reference => Objective::ReferenceLogError,
+                #[cfg(feature = "learn")]
                 ObjectiveName::CosineScale => Objective::CosineScaleInvariant,
+                #[cfg(feature = "learn")]
                 ObjectiveName::Training => Objective::Terms(LossConfig::default()),
             };
         }
@@ -234,7 +251,7 @@ impl Settings {
     pub(super) fn start(&self, whole: bool, has_encoder: bool) -> (Start, usize) {
         let start = match self.start {
             Some(start) => start,
-            None if whole && has_encoder && self.preset != Preset::Renipp => Start::Encoder,
+            None if whole && has_encoder && self.preset.starts_at_the_encoder() => Start::Encoder,
             None => Start::Zero,
         };
         let default = if whole { 1 } else { STARTS };

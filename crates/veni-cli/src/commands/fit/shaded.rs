@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use veni_core::LoadedModel;
-use veni_core::fit::matching_exposure;
+use veni_fit::matching_exposure;
+use veni_image::Picture;
 use veni_light::latent::Latent;
 use veni_fit::shade::{
     Camera, Colour, ExposureForm, Lights, Material, NormalMap, ShadedImage, ShadedLoss, ShadingForm, Surface,
@@ -13,7 +13,7 @@ use veni_fit::shade::{
 };
 use veni_light::sphere::{Equirect, View};
 
-use super::input::Read;
+use super::model::FitModel;
 use crate::numbers::{albedo, fraction, lights, shininess};
 use crate::output::CAMERA;
 
@@ -66,13 +66,13 @@ impl Shaded {
         &self,
         normals: &Path,
         mask: Option<&Path>,
-        picture: &Read,
+        picture: &Picture,
         view: Option<View>,
     ) -> Result<ShadedImage> {
         let map = NormalMap::read(normals)?;
         let sizes = |path: &Path, size: [usize; 2]| -> Result<()> {
-            if size != picture.size {
-                let [[w, h], [pw, ph]] = [size, picture.size];
+            if size != picture.size() {
+                let [[w, h], [pw, ph]] = [size, picture.size()];
                 bail!("{}: is {w} x {h}, the picture {pw} x {ph}: they must have one size", path.display());
             }
             Ok(())
@@ -114,7 +114,7 @@ impl Shaded {
             ),
         };
         let transfer = Transfer::new(&surface, &material, lights, form)?;
-        Ok(ShadedImage::new(transfer, &picture.pixels, loss)?.with_exposure(exposure))
+        Ok(ShadedImage::new(transfer, picture.pixels(), loss)?.with_exposure(exposure))
     }
 
     /// From the camera that the normals' file names, or from --fov and --look.
@@ -146,8 +146,8 @@ impl Shaded {
     pub(super) fn exposed(
         &self,
         image: &ShadedImage,
-        picture: &Read,
-        subject: &LoadedModel,
+        picture: &Picture,
+        model: &FitModel,
         starts: &mut [Latent],
     ) -> Result<()> {
         if self.shading == Shading::Reference {
@@ -155,8 +155,8 @@ impl Shaded {
         }
         let grid = Equirect::new(self.lights, self.lights / 2);
         for start in starts {
-            let light = subject.decode(grid, std::slice::from_ref(start))?.concat();
-            start.log_exposure += matching_exposure(image, &picture.pixels, light.as_chunks().0);
+            let light = model.decode(grid, start)?;
+            start.log_exposure += matching_exposure(image, picture.pixels(), light.as_chunks().0);
         }
         Ok(())
     }

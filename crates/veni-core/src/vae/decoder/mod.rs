@@ -31,10 +31,14 @@ pub use linear::Linear;
 pub use native::Native;
 pub use tokens::{Memory, TokenLayer, Tokens};
 
-use veni_light::model::{Conditioning, DecoderConfig};
+use veni_light::model::{Conditioning, DecoderConfig, Model};
+
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
+
+use crate::Result;
+use crate::vae::weights;
 
 /// Latent and directions to log radiance.
 #[derive(Module, Debug)]
@@ -68,6 +72,18 @@ pub enum Layers {
 }
 
 impl Decoder {
+    /// The decoder of a model file.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the model's tensors are not those its configuration implies.
+    pub fn from_model(model: &Model, device: &Device) -> Result<Self> {
+        // every weight is replaced; the generator's only part is to give them a shape
+        let mut rng: chacha20::ChaCha8Rng = rand::SeedableRng::seed_from_u64(0);
+        let decoder = Self::new(&model.config().decoder, model.latent_vectors(), &mut rng, device);
+        let tensors = model.tensors().iter().filter(|(name, _)| name.starts_with("decoder."));
+        weights::write(decoder, "decoder", &tensors.map(|(name, t)| (name.clone(), t.clone())).collect())
+    }
+
     /// A decoder for N = `latent_vectors` with weights drawn from `rng`: linear layers uniform in
     /// ±1/√inputs (sine layers as their authors say), norms at identity, the conditioning alive (see
     /// [`Condition::new`]).

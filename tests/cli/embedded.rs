@@ -1,0 +1,60 @@
+//! `encode` and `fit` with the model inside the program: what every build can do.
+
+use serde_json::Value;
+
+use crate::util::{Dir, panorama, text};
+
+/// A photograph or damaged file of the image crate's tests.
+fn file(name: &str) -> String {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../veni-image/tests/files");
+    text(&folder.join(name))
+}
+
+fn latent(value: &Value) -> Vec<f64> {
+    let vectors = value["latent"]["vectors"].as_array().unwrap();
+    vectors.iter().flat_map(|v| v.as_array().unwrap()).map(|v| v.as_f64().unwrap()).collect()
+}
+
+fn one(dir: &Dir, args: &[&str]) -> Value {
+    let results = dir.json(args);
+    let [result] = &results[..] else { panic!("{args:?}: {} results", results.len()) };
+    result.clone()
+}
+
+#[test]
+fn a_panorama_is_encoded_and_a_fit_improves_on_that() {
+    let dir = Dir::new();
+    let encoded = one(&dir, &["encode", &panorama()]);
+    let psnr = |value: &Value| value["ldr_psnr"].as_f64().unwrap();
+    // held out, and of an easy kind: what the model card says of it is above 20 dB
+    assert!(psnr(&encoded) > 15.0, "{encoded}");
+    assert_eq!(latent(&encoded).len(), 27);
+    let fitted = one(&dir, &["fit", &panorama()]);
+    assert!(psnr(&fitted) > psnr(&encoded), "{} dB after {} dB", psnr(&fitted), psnr(&encoded));
+    assert!(fitted["loss"].as_f64().unwrap() > 0.0);
+    // and a baked latent is encoded on the fly
+    dir.ok(&["bake", &panorama(), "--size", "64", "--device", "cpu", "-o", "again.exr"]);
+}
+
+#[test]
+fn a_photograph_stands_upright_as_its_exif_data_says() {
+    let dir = Dir::new();
+    let fit = |name: &str| {
+        let args = ["fit", &file(name), "--fov", "65", "--look", "30,10", "--starts", "1", "--steps", "40"];
+        latent(&one(&dir, &args))
+    };
+    let upright = fit("photo_upright.jpg");
+    for turned in ["photo_exif3.jpg", "photo_exif6.jpg"] {
+        let found = fit(turned);
+        let apart = upright.iter().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        // the JPEG of each orientation was compressed by itself
+        assert!(apart < 0.3, "{turned}: {apart}");
+    }
+}
+
+#[test]
+fn a_truncated_photograph_is_refused() {
+    let dir = Dir::new();
+    dir.refused(&["fit", &file("photo_trunc.jpg"), "--fov", "65"], &["photo_trunc.jpg", "truncated JPEG file"]);
+    dir.refused(&["fit", &file("trunc.jpg")], &["trunc.jpg", "truncated JPEG file"]);
+}
