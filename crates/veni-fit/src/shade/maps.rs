@@ -136,8 +136,11 @@ fn linear(path: &Path) -> Result<([usize; 2], Vec<[f32; 3]>)> {
     Ok(([grid.width, grid.height], image.into_pixels()))
 }
 
+/// Width and height, and the values of the pixels.
+type Rgba = ([usize; 2], Vec<[f32; 4]>);
+
 /// Values 0 to 1, not linearised: red, green, blue, alpha; where the file is one of display values.
-fn display(path: &Path) -> Result<Option<([usize; 2], Vec<[f32; 4]>)>> {
+fn display(path: &Path) -> Result<Option<Rgba>> {
     if !LdrPanorama::recognise(path)? {
         return Ok(None);
     }

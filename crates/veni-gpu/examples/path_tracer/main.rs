@@ -51,7 +51,7 @@ fn main() -> Result<()> {
     let found = pollster::block_on(adapters::list());
     let adapter = found.first().ok_or("no graphics adapter; on Linux, Mesa's lavapipe is one in software")?;
     // With everything it has, f16 weights included; software would only convert them. A host that renders has its own
-    // device: see the example `own_device`.
+    // device: see the example `5_own_device`.
     let opened = match adapter.is_software() {
         true => pollster::block_on(adapter.open_plain())?,
         false => pollster::block_on(adapter.open())?,

@@ -136,7 +136,7 @@ fn the_function_file_is_that_of_the_shipped_model() {
     let file = include_str!("../../../../assets/veni_field.wgsl");
     assert!(
         file == shader::field(PAPER),
-        "out of date: cargo run --release -p veni-gpu --example shader_text > assets/veni_field.wgsl"
+        "out of date: cargo run --release -p veni-gpu --example 6_wgsl > assets/veni_field.wgsl"
     );
 }
 

@@ -7,7 +7,7 @@ pub(super) fn to_f32(bits: u16) -> f32 {
         // zero and subnormals count in steps of 2⁻²⁴
         ..0x0400 => (magnitude as f32 * f32::from_bits(0x3380_0000)).to_bits(),
         // the exponent's offset is 15 there, 127 here
-        ..0x7c00 => (magnitude << 13) + ((127 - 15) << 23),
+        0x0400..0x7c00 => (magnitude << 13) + ((127 - 15) << 23),
         // infinity, and what is not a number
         _ => 0x7f80_0000 | (magnitude & 0x03ff) << 13,
     };
@@ -24,8 +24,8 @@ pub(super) fn from_f32(value: f32) -> u16 {
         ..0x3880_0000 => ((magnitude + 0.5).to_bits() - 0.5_f32.to_bits()) as u16,
         // 13 bits go. Half of their worth is added, less one where the last bit that stays is even; a carry into the
         // exponent is right, up to infinity.
-        ..0x4780_0000 => ((bits - ((127 - 15) << 23) + 0x0fff + (bits >> 13 & 1)) >> 13) as u16,
-        ..=0x7f80_0000 => 0x7c00,
+        0x3880_0000..0x4780_0000 => ((bits - ((127 - 15) << 23) + 0x0fff + (bits >> 13 & 1)) >> 13) as u16,
+        0x4780_0000..=0x7f80_0000 => 0x7c00,
         _ => 0x7e00,
     }
 }

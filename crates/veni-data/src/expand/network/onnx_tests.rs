@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::onnx_file::{FLOAT, INT32, OnnxFile};
 use super::*;
-use crate::expand::CLIPPED;
+use crate::expand::{CLIPPED, Expand};
 
 const GRID: Equirect = Equirect { width: 32, height: 16 };
 

@@ -2,7 +2,7 @@
 //! handler, cube map, command encoder and submission are all the host's.
 //!
 //! ```sh
-//! cargo run --release -p veni-gpu --example own_device            # --seed 7 --model FILE
+//! cargo run --release -p veni-gpu --example 5_own_device            # --seed 7 --model FILE
 //! ```
 //!
 //! Every frame the sky turns by 30 degrees. One command encoder takes two passes: veni bakes the turned light into the
@@ -266,7 +266,7 @@ fn arguments() -> Result<(PathBuf, u64)> {
         match name.as_str() {
             "--model" => model = value.into(),
             "--seed" => seed = value.parse().map_err(|_| format!("--seed {value}: not a whole number"))?,
-            _ => return Err(format!("unknown argument {name}; own_device [--seed S] [--model FILE]").into()),
+            _ => return Err(format!("unknown argument {name}; 5_own_device [--seed S] [--model FILE]").into()),
         }
     }
     Ok((model, seed))

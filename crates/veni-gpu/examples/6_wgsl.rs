@@ -2,9 +2,9 @@
 //! there through naga or Tint to SPIR-V, MSL or HLSL. Needs no graphics device.
 //!
 //! ```sh
-//! cargo run --release -p veni-gpu --example shader_text > field.wgsl              # a function to paste
-//! cargo run --release -p veni-gpu --example shader_text -- --module > field.wgsl  # a naga_oil module to import
-//! cargo run --release -p veni-gpu --example shader_text -- --kernel > bake.wgsl   # a whole compute kernel
+//! cargo run --release -p veni-gpu --example 6_wgsl > field.wgsl              # a function to paste
+//! cargo run --release -p veni-gpu --example 6_wgsl -- --module > field.wgsl  # a naga_oil module to import
+//! cargo run --release -p veni-gpu --example 6_wgsl -- --kernel > bake.wgsl   # a whole compute kernel
 //! ```
 //!
 //! `--model FILE` takes another model. What a host must bind is said on standard error. The buffers' content comes from
@@ -18,7 +18,7 @@ use veni_gpu::shader::{self, Directions, ENTRY_POINT, Kernel, Sizes, Store, Vari
 
 /// Workgroup memory that every WebGPU device has, bytes.
 const WORKGROUP_MEMORY: u32 = 16 << 10;
-const USAGE: &str = "shader_text [--function | --module | --kernel] [--model FILE]";
+const USAGE: &str = "6_wgsl [--function | --module | --kernel] [--model FILE]";
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../veni-light/assets/veni-27.safetensors");
