@@ -7,11 +7,13 @@ use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared, Outcome::Skipped};
 use burn::tensor::{Device, Gradients, Tensor, activation};
 use rand::SeedableRng;
-use veni::model::{Conditioning, DecoderConfig, Encoding, Equivariance, Invariance, OutputForm, VnReluForm};
+use veni::model::{
+    Array, Conditioning, DecoderConfig, Encoding, Equivariance, Invariance, OutputForm, VnReluForm,
+};
 use veni::sphere::Equirect;
 use veni::sphere::reference::decoder_directions;
 use veni::vae::decoder::{Decoder, reni_2022_inputs, rotate};
-use veni::vae::weights::{self, Array, Weights};
+use veni::vae::weights::{self, Weights};
 
 /// See [`Family`](crate::Family).
 pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
