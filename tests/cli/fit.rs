@@ -58,20 +58,33 @@ fn a_sky_of_the_model_is_found_again() {
 }
 
 #[test]
-fn every_preset_and_objective_runs_and_seeds_name_starts() {
+fn every_preset_and_objective_lowers_its_loss_and_seeds_name_starts() {
     let dir = Dir::new();
-    let loss = |args: &[&str]| {
-        let common = ["fit", &panorama(), "--model", model(), "--resolution", "32x16", "--steps", "3"];
+    let loss_after = |steps: &str, args: &[&str]| {
+        let common = ["fit", &panorama(), "--model", model(), "--resolution", "32x16", "--steps", steps];
         let [value] = &dir.json(&[&common[..], args].concat())[..] else { panic!("one object") };
         let loss = value["loss"].as_f64().unwrap();
         assert!(loss.is_finite() && loss > 0.0, "{args:?}");
         loss
     };
+    let loss = |args: &[&str]| loss_after("3", args);
+    // where a fit stood still or went up, 30 updates would be no better than one; a model of two steps of training
+    // follows a real sky badly, so that a percent is all that is asked
+    let falls = |args: &[&str]| {
+        let (one, many) = (loss_after("1", args), loss_after("30", args));
+        assert!(many < 0.99 * one, "{args:?}: {one} after one update, {many} after 30");
+    };
     for preset in ["energy", "thorough", "display", "reference", "reni++"] {
-        loss(&["--preset", preset]);
+        falls(&["--preset", preset, "--method", "adam"]);
     }
     for objective in ["log", "absolute", "display", "reference", "cosine-scale", "training"] {
-        loss(&["--objective", objective]);
+        falls(&["--objective", objective, "--method", "adam"]);
+    }
+    // and the method for a sum over pixels gets at least as far in as many updates
+    for preset in ["energy", "thorough", "display"] {
+        let marquardt = loss_after("30", &["--preset", preset, "--method", "levenberg-marquardt"]);
+        let adam = loss_after("30", &["--preset", preset, "--method", "adam"]);
+        assert!(marquardt <= 1.02 * adam, "{preset}: {marquardt} and {adam} by adam");
     }
     let lit = |share: &str| loss(&["--preset", "energy", "--share", share]);
     assert!(lit("0.05") == loss(&["--objective", "energy"]) && lit("0.05") != lit("0.2"));
@@ -238,9 +251,16 @@ fn the_light_on_a_ball_is_found() {
     let dull = ["ball.exr", "--normals", "n.exr", "--lights", "32", "-o", "dull.json", "--starts", "2"];
     let dull = fit(&dir, &dull);
     assert!(dull["loss"].as_f64() > found["loss"].as_f64(), "{dull} {found}");
-    // the authors' form runs too
-    let reference = fit(&dir, &[&all[..], &["--shading", "reference", "--force"]].concat());
-    assert!(reference["loss"].as_f64().unwrap().is_finite());
+    // the authors' form shades otherwise than this picture was shaded: it is fitted too, but not as well
+    let reference = |steps: &str| {
+        let args = [&all[..], &["--shading", "reference", "--force", "--steps", steps]].concat();
+        let [value] = &dir.json(&[&["fit", "--model", model()], &args[..]].concat())[..] else {
+            panic!("one object")
+        };
+        value["loss"].as_f64().unwrap()
+    };
+    let (one, many) = (reference("1"), reference("40"));
+    assert!(many < 0.99 * one && many > found["loss"].as_f64().unwrap(), "{one} to {many}, {found}");
 
     let refused = |args: &[&str], words: &[&str]| {
         dir.refused(&[&["fit", "--model", model(), "-q", "-o", "x.json"], args].concat(), words);

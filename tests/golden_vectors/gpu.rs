@@ -120,7 +120,10 @@ fn golden_on_gpu() {
         let case = Case::load(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         results.extend(run(&case, &gpu, 0.0).map(|verdict| (case.name.clone(), verdict)));
     }
-    summarise(&gpu.to_string(), &results);
+    let [passed, _] = summarise(&gpu.to_string(), &results);
+    // VENI's and RENI++'s decoders; the other forms of c05 are skipped by name, since they do not fold
+    let ours = std::env::var_os("VENI_GOLDEN_DIR").is_none();
+    assert!(passed >= 9 || !ours, "only {passed} cases are fields for the GPU");
 }
 
 #[test]

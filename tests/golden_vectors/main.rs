@@ -2,7 +2,7 @@
 //!
 //! Every `*.safetensors` file in the folder named by `VENI_GOLDEN_DIR` (default: `tests/golden`) is one
 //! case. Which module computes it is read from the file's metadata, sizes from its tensors; a kind that
-//! no module here knows is reported as skipped, by name. Devices: flex, and ndarray where that feature
+//! no module here knows fails, and so does the run if other cases were computed than are listed ([`report`]). Devices: flex, and ndarray where that feature
 //! is compiled in; `VENI_GOLDEN_DEVICE` restricts the run to one of them.
 //! With the feature `gpu`, the fields are computed by the GPU decoder too ([`gpu`]).
 //! `VENI_GOLDEN_VERBOSE` lists how much of its tolerance every tensor uses.

@@ -29,6 +29,18 @@ fn deviations_beyond_the_tolerance_are_counted() {
     assert!(check(&Data::new([3], vec![1.0; 3]), &golden, tolerance).is_err());
 }
 
+#[test]
+fn a_case_of_an_unknown_kind_fails() {
+    let path = crate::folder().join("c02_vn_linear_0.safetensors");
+    // a folder of other cases may lack it
+    let Some(mut case) = path.is_file().then(|| Case::load(&path).expect("a readable case")) else { return };
+    case.config["module"] = "VNCircular".into();
+    match run_case(&case, &Device::flex().autodiff()) {
+        Verdict::Failed(messages) => assert!(messages[0].contains("VNCircular"), "{messages:?}"),
+        other => panic!("{other:?}"),
+    }
+}
+
 /// A weight of every small case is moved, and the harness must see it.
 #[test]
 fn a_perturbed_weight_is_noticed() {

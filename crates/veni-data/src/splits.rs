@@ -1,5 +1,6 @@
 //! Which panoramas train and which validate.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -8,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::dataset::{Dataset, Heard, Item, load, panorama_files};
 use super::fold::Fold;
+use super::prepare::capture;
 use super::store::PixelStore;
 use crate::{Error, Result};
 use veni_light::random::{Purpose, stream};
@@ -19,7 +21,7 @@ use veni_synth::{Fixed, Scene, render};
 #[serde(deny_unknown_fields, default)]
 pub struct DataConfig {
     /// Folders (or single files). A folder with `train/` and `val/` inside is used as split there; other
-    /// panoramas are split by seed.
+    /// panoramas are split by seed, files of one [`capture`](crate::prepare::capture) together.
     pub folders: Vec<PathBuf>,
     /// Columns of the resampled panoramas.
     pub width: usize,
@@ -112,10 +114,14 @@ impl Splits {
             train.append(&mut undecided);
             (val, train) = fold.split(&train)?;
         }
-        let take = (undecided.len() as f64 * config.val_share).round() as usize;
-        let order = stream(seed, Purpose::Split, 0, 0).permutation(undecided.len());
-        for (rank, index) in order.into_iter().enumerate() {
-            if rank < take { &mut val } else { &mut train }.push(undecided[index].clone());
+        let mut left = (undecided.len() as f64 * config.val_share).round() as usize;
+        for files in captures_in_order(undecided, seed) {
+            if files.len() <= left {
+                left -= files.len();
+                val.extend(files);
+            } else {
+                train.extend(files);
+            }
         }
         train.sort();
         val.sort();
@@ -156,6 +162,21 @@ impl Splits {
         let val = items.drain(learned..files.len()).collect();
         Ok(Self { train: Dataset::new(grid, items), val: Dataset::new(grid, val) })
     }
+}
+
+/// The files by [`capture`], captures in an order that the seed decides: two files of one light must not be on both
+/// sides of a split.
+fn captures_in_order(files: Vec<PathBuf>, seed: u64) -> Vec<Vec<PathBuf>> {
+    let (mut groups, mut place) = (Vec::<Vec<PathBuf>>::new(), BTreeMap::new());
+    for file in files {
+        let at = *place.entry(capture(&file)).or_insert(groups.len());
+        if at == groups.len() {
+            groups.push(Vec::new());
+        }
+        groups[at].push(file);
+    }
+    let order = stream(seed, Purpose::Split, 0, 0).permutation(groups.len());
+    order.into_iter().map(|at| std::mem::take(&mut groups[at])).collect()
 }
 
 /// Scenes 0..`count` of the set with this seed, in order; each goes through `keep` with its number.
@@ -233,6 +254,41 @@ mod tests {
         all.sort();
         assert_eq!(all.concat(), "abcdefgh");
         assert!((2..20).any(|seed| names(&split(seed).val) != names(&first.val)));
+    }
+
+    #[test]
+    fn no_capture_is_on_both_sides() {
+        // four captures in nine files: other sizes, brackets and views of one light
+        let files = [
+            "meadow_1k.exr",
+            "meadow_2k.exr",
+            "meadow_puresky.exr",
+            "quay.exr",
+            "quay_mirrored.exr",
+            "roof_01.exr",
+            "roof_02.exr",
+            "hill_ev-2.exr",
+            "hill_ev0.exr",
+        ];
+        let folder = folder(&files);
+        let of = |set: &Dataset| {
+            let captures = names(set).into_iter().map(|n| capture(Path::new(&n)));
+            captures.collect::<std::collections::BTreeSet<_>>()
+        };
+        let mut held = std::collections::BTreeSet::new();
+        for seed in 0..12 {
+            for (share, most) in [(0.25, 2), (0.5, 5), (0.1, 1)] {
+                let config = DataConfig { val_share: share, ..config(folder.path()) };
+                let splits = Splits::open(&config, seed).unwrap();
+                assert_eq!(splits.train.len() + splits.val.len(), files.len());
+                assert!(splits.val.len() <= most, "{share}, seed {seed}: {:?}", names(&splits.val));
+                assert!(share < 0.2 || !splits.val.is_empty(), "{share}, seed {seed}");
+                let (train, val) = (of(&splits.train), of(&splits.val));
+                assert!(train.is_disjoint(&val), "{share}, seed {seed}: {train:?} and {val:?}");
+                held.extend(val);
+            }
+        }
+        assert_eq!(held.len(), 4, "{held:?}");
     }
 
     #[test]

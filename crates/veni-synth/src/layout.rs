@@ -58,7 +58,8 @@ pub(super) fn layout(scene: &Scene) -> Layout {
         layout: Layout::default(),
     };
     builder.place(scene.place, scene.fullness);
-    if scene.lit {
+    // under a pure sky there is no ground that lamps could stand on
+    if scene.lit && scene.place != Place::PureSky {
         builder.distant_lamps();
         builder.street_light(scene.place);
     }

@@ -90,50 +90,72 @@ fn under(sky: SkyKind, count: u64) -> impl Iterator<Item = Scene> {
     })
 }
 
+/// Horizontal illuminance of daylight over the sine of the sun's elevation: 128 klx reach the atmosphere, and of them
+/// some 100 to 120 the ground under a clear sky, a tenth to a half under a closed one (CIE 110, 1994).
 #[test]
 fn the_light_of_every_weather_is_that_of_light_meters() {
     for sky in SkyKind::ALL {
-        let mut all: Vec<_> = under(sky, 24)
+        let all: Vec<_> = under(sky, 24)
             .map(|scene| {
                 let panorama = render(&scene, SMALL);
-                let level = illuminance(&panorama, [0.0, 0.0, 1.0]);
                 let half = &panorama.pixels()[..SMALL.len() / 2];
-                let blue = half.iter().map(|p| p[2]).sum::<f32>() / half.iter().map(|p| p[0]).sum::<f32>();
                 let brightest = half.iter().map(|p| luminance(*p)).fold(0f32, f32::max);
-                (
-                    level,
-                    scene.sun_elevation,
-                    blue,
-                    brightest,
-                    level / f64::from(scene.sun_elevation.to_radians().sin()),
-                )
+                (illuminance(&panorama, [0.0, 0.0, 1.0]), scene.sun_elevation, brightest)
             })
             .collect();
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
-        println!("CAL {sky:?} {all:.3?}");
+        let each =
+            |low: f64, high: f64| assert!(all.iter().all(|a| (low..high).contains(&a.0)), "{sky:?}: {all:?}");
+        let mut ratios: Vec<_> =
+            all.iter().map(|(klx, e, _)| klx / f64::from(e.to_radians().sin())).collect();
+        ratios.sort_unstable_by(f64::total_cmp);
+        // 20 klx and more from the sun in one pixel of 11° (0.038 sr) are 500 kcd/m²; no cloud is as bright
+        let suns = all.iter().filter(|(_, _, brightest)| *brightest > 500.0).count();
+        match sky {
+            SkyKind::Clear => {
+                each(10.0, 128.0);
+                assert!((95.0..120.0).contains(&ratios[12]) && suns >= 20, "{ratios:?}, {suns}");
+            }
+            SkyKind::Cloudy => {
+                each(5.0, 128.0);
+                assert!((70.0..115.0).contains(&ratios[12]) && (8..24).contains(&suns), "{ratios:?}, {suns}");
+            }
+            SkyKind::Overcast => {
+                each(1.0, 90.0);
+                assert!((20.0..65.0).contains(&ratios[12]) && suns == 0, "{ratios:?}, {suns}");
+            }
+            SkyKind::Sunset => each(0.05, 15.0),
+            // starlight to full moon and the end of dusk
+            SkyKind::Night => each(1e-7, 1e-3),
+        }
     }
 }
 
 #[test]
 fn every_place_shows_as_much_sky_as_its_name_says() {
+    // the mean share of the upper half space that is open, and the least of 24 scenes
+    let expected = |place| match place {
+        Place::PureSky => (1.0..1.01, 1.0),
+        Place::Plain | Place::Coast => (0.85..0.97, 0.6),
+        Place::Hills => (0.68..0.85, 0.5),
+        Place::Lake => (0.75..0.92, 0.5),
+        Place::Park | Place::Village | Place::Rocks => (0.62..0.85, 0.2),
+        Place::Square => (0.45..0.68, 0.15),
+        Place::Street => (0.33..0.55, 0.05),
+        Place::Courtyard => (0.25..0.5, 0.02),
+        Place::Shelter => (0.1..0.35, 0.0),
+        Place::Forest => (0.0..0.1, 0.0),
+    };
     for place in Place::ALL {
         let fixed = Fixed { sky: Some(SkyKind::Cloudy), place: Some(place), ..Fixed::default() };
-        let mut shares: Vec<_> = (0..24)
-            .map(|index| {
-                let scene = Scene::draw(32, index, &fixed);
-                let stage = stage::Stage::new(&scene);
-                let open = sky::spiral(400).filter(|d| stage.is_clear(*d, f32::INFINITY)).count();
-                open as f32 / 400.0
-            })
-            .collect();
-        shares.sort_unstable_by(f32::total_cmp);
-        println!(
-            "CAL {place:?} {} {} {} mean {}",
-            shares[0],
-            shares[12],
-            shares[23],
-            shares.iter().sum::<f32>() / 24.0
-        );
+        let shares: [f32; 24] = std::array::from_fn(|index| {
+            let scene = Scene::draw(32, index as u64, &fixed);
+            let stage = stage::Stage::new(&scene);
+            let open = sky::spiral(400).filter(|d| stage.is_clear(*d, f32::INFINITY)).count();
+            open as f32 / 400.0
+        });
+        let (mean, least) = (shares.iter().sum::<f32>() / 24.0, shares.iter().fold(1f32, |a, b| a.min(*b)));
+        let (range, low) = expected(place);
+        assert!(range.contains(&mean) && least >= low, "{place:?}: {mean}, {least} at least");
     }
 }
 

@@ -5,8 +5,11 @@ use veni_light::sphere::Equirect;
 use veni_synth::{Fixed, Scene, render};
 
 /// Seed and index; digests of the parameters and of the pixels at 32 × 16, mean luminance (kcd/m²).
-const SCENES: [([u64; 2], u64, u64, f64); 3] =
-    [([0, 0], 0x0, 0x0, 0.0), ([7, 3], 0x0, 0x0, 0.0), ([2026, 41], 0x0, 0x0, 0.0)];
+const SCENES: [([u64; 2], u64, u64, f64); 3] = [
+    ([0, 0], 0x58a1_0733_6345_d0fe, 0x7c7f_dfb3_6ddd_a5cc, 9.709984e0),
+    ([7, 3], 0xf433_5b17_0d50_a2dd, 0xe93f_8ab0_a315_0f1a, 2.618227e-1),
+    ([2026, 41], 0x5c23_9543_75ea_469b, 0x1d7d_b925_fd1b_6959, 1.311019e1),
+];
 
 /// FNV-1a of 64 bits.
 fn digest(bytes: impl IntoIterator<Item = u8>) -> u64 {

@@ -77,13 +77,37 @@ impl WithSimd for Chains {
 
 #[cfg(test)]
 mod tests {
-    use super::multiply_add_rate;
+    use super::*;
 
-    /// A core does some 10¹⁰ operations a second, even without SIMD more than 10⁸; no machine of today does 10¹⁵, which
-    /// a loop that the compiler removed would seem to.
+    /// Chains of multiply-adds that all converge to 1 are the operations that are counted: rounds × steps × chains of
+    /// two for every lane of every thread.
     #[test]
-    fn the_rate_is_that_of_a_processor() {
-        let rate = multiply_add_rate();
-        assert!(rate.is_finite() && rate > 1e8 && rate < 1e15, "{rate:e}");
+    fn every_operation_that_is_counted_is_done() {
+        let lanes = crate::field::tasks::on_every_thread(|| pulp::Arch::new().dispatch(Chains { rounds: 1 }));
+        let [(_, once), (_, often)] = [1, 1000].map(timed);
+        assert_eq!(once, (lanes.iter().sum::<usize>() * 2 * 8 * 12) as f64);
+        assert_eq!(often, 1000.0 * once);
+    }
+
+    /// A loop of one chain without SIMD, on one thread, does a multiply-add in some 8 cycles. A core with SIMD does 2 × 12
+    /// in that time and more, for each of its lanes: if it did fewer, or beyond 64 times as many, a loop was removed or
+    /// counted wrongly.
+    #[test]
+    fn the_rate_is_that_of_the_processor() {
+        let count = 1 << 22;
+        let plain = (0..5).map(|_| {
+            let (factor, term, mut x) = (black_box(0.999f32), black_box(0.001f32), black_box(0.0f32));
+            let started = Instant::now();
+            for _ in 0..count {
+                x = x * factor + term;
+            }
+            black_box(x);
+            f64::from(2 * count) / started.elapsed().as_secs_f64()
+        });
+        let plain = plain.fold(0.0, f64::max);
+        let lanes = crate::field::tasks::on_every_thread(|| pulp::Arch::new().dispatch(Chains { rounds: 1 }));
+        let ratio = multiply_add_rate() / plain;
+        let (one, all) = (lanes[0] as f64, lanes.iter().sum::<usize>() as f64);
+        assert!((one..64.0 * all).contains(&ratio), "{ratio} times a plain loop with {lanes:?} lanes");
     }
 }
