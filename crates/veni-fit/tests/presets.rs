@@ -25,7 +25,7 @@ fn each_preset_lowers_its_loss_and_is_best_under_its_own_objective() {
     let decoder = Model::filler(&config, 1).unwrap().decoder().unwrap();
     let picture = picture();
     let images = [picture.as_slice()];
-    let target = FitTarget::panoramas(GRID, &images);
+    let target = FitTarget::panoramas(GRID, &images).unwrap();
     let none = Latent::new(vec![[0.1, 0.2, 0.3]; 4]);
     let presets = [
         ("thorough", FitConfig::thorough()),
