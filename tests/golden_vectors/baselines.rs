@@ -140,7 +140,7 @@ fn fit(
         if step == 0 {
             compare(case, "out.grad0", &slope);
         }
-        adam.step(&mut x, &slope, number("lr"));
+        x.iter_mut().zip(adam.step(&slope, number("lr"))).for_each(|(x, by)| *x += by);
     }
     compare(case, "out.losses", &losses);
     compare(case, &format!("out.params{steps}"), &x);

@@ -33,6 +33,7 @@ mod target;
 pub use fitted::{FLOOR, Field, Fitted};
 pub use system::{Baseline, Kind};
 pub use target::Space;
+pub use veni_fit::Adam;
 
 #[cfg(test)]
 mod tests;
