@@ -11,7 +11,7 @@
 use veni_light::field::Field;
 use veni_light::latent::Latent;
 use veni_light::model::Model;
-use veni_light::random::{Purpose, normal, stream};
+use veni_light::random::{Purpose, stream};
 
 const SIZE: [usize; 2] = [240, 160];
 const SAMPLES: usize = 32;
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut rng = stream(0, Purpose::Sampling, pixel as u64, 0);
         let mut sum = [0.0; 3];
         for _ in 0..SAMPLES {
-            let random = &mut || unit([0; 3].map(|_| normal(&mut rng) as f32));
+            let random = &mut || unit([0; 3].map(|_| rng.normal() as f32));
             let light = trace(&field, [-4.0, 0.0, 1.0], unit([1.5, -u, v - 0.25]), random);
             sum = add(sum, 1.0 / SAMPLES as f32, light);
         }
