@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use super::Panorama;
+use crate::panorama::Panorama;
 use veni_light::sphere::Equirect;
 
 /// Source positions and weights (summing to 1) of one output column.

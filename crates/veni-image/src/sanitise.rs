@@ -1,10 +1,7 @@
 //! Making radiance positive and finite, as the training images of the authors were.
 
-use super::Panorama;
+use crate::panorama::{LOG_FLOOR, Panorama};
 use crate::{Error, Result};
-
-/// Added to radiance before the logarithm, ln(L + 1e-8), so that the darkest values stay bounded.
-pub const LOG_FLOOR: f32 = 1e-8;
 
 /// How many values [`sanitise_values`] replaced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -113,11 +113,11 @@ fn the_light_of_every_weather_is_that_of_light_meters() {
         match sky {
             SkyKind::Clear => {
                 each(10.0, 128.0);
-                assert!((95.0..120.0).contains(&ratios[12]) && suns >= 20, "{ratios:?}, {suns}");
+                assert!((95.0..120.0).contains(&ratios[12]) && suns >= 18, "{ratios:?}, {suns}");
             }
             SkyKind::Cloudy => {
                 each(5.0, 128.0);
-                assert!((70.0..115.0).contains(&ratios[12]) && (8..24).contains(&suns), "{ratios:?}, {suns}");
+                assert!((70.0..122.0).contains(&ratios[12]) && (8..24).contains(&suns), "{ratios:?}, {suns}");
             }
             SkyKind::Overcast => {
                 each(1.0, 90.0);
@@ -135,9 +135,9 @@ fn every_place_shows_as_much_sky_as_its_name_says() {
     // the mean share of the upper half space that is open, and the least of 24 scenes
     let expected = |place| match place {
         Place::PureSky => (1.0..1.01, 1.0),
-        Place::Plain | Place::Coast => (0.85..0.97, 0.6),
-        Place::Hills => (0.68..0.85, 0.5),
-        Place::Lake => (0.75..0.92, 0.5),
+        Place::Plain | Place::Coast => (0.85..0.97, 0.4),
+        Place::Hills => (0.68..0.85, 0.4),
+        Place::Lake => (0.75..0.92, 0.4),
         Place::Park | Place::Village | Place::Rocks => (0.62..0.85, 0.2),
         Place::Square => (0.45..0.68, 0.15),
         Place::Street => (0.33..0.55, 0.05),

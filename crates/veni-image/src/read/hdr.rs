@@ -8,7 +8,7 @@ use image::codecs::hdr::{HdrDecoder, HdrMetadata};
 use image::{ImageDecoder, ImageError};
 
 use super::ReadOptions;
-use crate::Panorama;
+use crate::panorama::Panorama;
 use crate::{Error, Result};
 
 pub(super) fn read(file: impl Read, path: &Path, strict: bool, options: &ReadOptions) -> Result<Panorama> {

@@ -7,7 +7,7 @@ use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::{LDR, ReadOptions, first_bytes, open, stands, unknown};
-use crate::Panorama;
+use crate::panorama::Panorama;
 use crate::tonemap::srgb_to_linear;
 use veni_light::sphere::Equirect;
 use crate::{Error, Result};

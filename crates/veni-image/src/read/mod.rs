@@ -15,7 +15,7 @@ use std::path::Path;
 
 use image::ImageFormat;
 
-use super::Panorama;
+use crate::panorama::Panorama;
 use veni_light::sphere::Equirect;
 use crate::{Error, Result};
 

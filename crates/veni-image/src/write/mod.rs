@@ -8,7 +8,7 @@ mod png;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::Panorama;
+use crate::panorama::Panorama;
 use super::tonemap::Tonemap;
 use veni_light::output::{Overwrite, write_atomic};
 use veni_light::sphere::Equirect;

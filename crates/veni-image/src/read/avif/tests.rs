@@ -3,7 +3,7 @@
 //! Pillow 12 at quality 95.
 
 use super::*;
-use crate::Panorama;
+use crate::panorama::Panorama;
 
 const FILES: [(&str, &[u8]); 6] = [
     ("10 bits, 4:4:4, BT.2020, full", include_bytes!("files/10-bit-444-bt2020.avif")),
