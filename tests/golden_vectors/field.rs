@@ -211,7 +211,7 @@ impl Sizes {
     }
 }
 
-/// The VN-ReLU of the authors' program that the case is from.
+/// The VN-ReLU of the reference implementation that the case is from.
 pub(crate) fn form(case: &Case) -> VnReluForm {
     if case.module().starts_with("RENI") { VnReluForm::ReferenceNormGuard } else { VnReluForm::Reference }
 }

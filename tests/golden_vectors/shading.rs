@@ -43,7 +43,7 @@ fn exp(log: &[[f32; 3]]) -> Vec<[f32; 3]> {
 }
 
 fn grid(case: &Case, name: &str) -> Equirect {
-    let [height, width, 3] = case.data(name).shape[..] else { panic!("{name} is no image") };
+    let [height, width, 3] = case.data(name).shape[..] else { panic!("{name} is not an image") };
     Equirect::new(width, height)
 }
 

@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::schedule::WeightSchedule;
 
-/// Mathematically right, or the authors' program.
+/// Mathematically right, or the reference implementation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LossForm {
     /// As described in the paper, with solid-angle weights at pixel centres.
     #[default]
     Corrected,
-    /// As in the authors' program.
+    /// As in the reference implementation.
     Reference,
 }
 
@@ -64,7 +64,7 @@ impl Default for LossConfig {
 }
 
 impl LossConfig {
-    /// The authors' program: reference forms, the paper's weights, no separate level.
+    /// The reference implementation: reference forms, the paper's weights, no separate level.
     pub fn reference() -> Self {
         Self { form: LossForm::Reference, level: WeightSchedule::Constant(0.0), ..Self::default() }
     }

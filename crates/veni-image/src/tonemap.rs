@@ -1,6 +1,6 @@
 //! From radiance to 8-bit sRGB.
 //!
-//! Two curves: [`Tonemap::reference`] is what the LDR metrics of the article use (its own 98 % quantile becomes
+//! Two curves: [`Tonemap::reference`] is what the LDR metrics of the paper use (its own 98 % quantile becomes
 //! white, sRGB curve, clamped), and [`Tonemap::filmic`] is for previews that people look at.
 
 use super::{LOG_FLOOR, Panorama};
@@ -31,7 +31,7 @@ pub enum Curve {
 }
 
 impl Tonemap {
-    /// The article's: radiance divided by its own 98 % quantile over all values.
+    /// The paper's: radiance divided by its own 98 % quantile over all values.
     pub fn reference(image: &Panorama) -> Self {
         let white = quantile(image.pixels().as_flattened(), REFERENCE_QUANTILE).max(f32::MIN_POSITIVE);
         Self { scale: 1.0 / white, curve: Curve::Srgb }
@@ -62,7 +62,7 @@ impl Tonemap {
     }
 }
 
-/// The sRGB transfer function (IEC 61966-2-1) with the article's constants: 12.92 v up to 0.0031308, else
+/// The sRGB transfer function (IEC 61966-2-1) with the paper's constants: 12.92 v up to 0.0031308, else
 /// 1.055 |v|^(1/2.4) − 0.055. Not clamped.
 pub fn srgb(v: f32) -> f32 {
     if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
@@ -73,7 +73,7 @@ pub fn srgb_to_linear(v: f32) -> f32 {
     if v <= 12.92 * 0.003_130_8 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Radiance to the LDR space of the article's metrics: divided by its own 98 % quantile over all values, sRGB
+/// Radiance to the LDR space of the paper's metrics: divided by its own 98 % quantile over all values, sRGB
 /// curve, clamped to [0, 1]. Returns the values and the quantile.
 ///
 /// # Panics

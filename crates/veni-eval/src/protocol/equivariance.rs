@@ -23,7 +23,7 @@ use veni_light::sphere::Equirect;
 /// Latents that stand for all where there is no encoder to give some.
 const DRAWN: u64 = 4;
 /// Why a stripe cannot be turned by.
-const NARROW: &str = "stripes are no whole number of pixels";
+const NARROW: &str = "stripes are not a whole number of pixels";
 
 /// Table: one row per measure, one column per model; per model with an encoder the error over the angle as a curve.
 ///
@@ -79,7 +79,7 @@ struct Encoding<'a> {
     grid: Equirect,
     images: Vec<&'a [f32]>,
     latents: Vec<Latent>,
-    /// Columns per stripe; 0 if that is no whole number.
+    /// Columns per stripe; 0 if that is not a whole number.
     stripe: usize,
 }
 
@@ -136,7 +136,7 @@ fn encoder(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<(Measures, Opt
         pair(turned(grid.width / 4, stripe > 0 && grid.width.is_multiple_of(4 * stripe))?, NARROW),
         pair(
             turned(stripe / 2, stripe > 1 && stripe.is_multiple_of(2))?,
-            "half a stripe is no whole number of pixels",
+            "half a stripe is not a whole number of pixels",
         ),
         pair(Some(encoding.errors(|image| mirror(grid, image), Latent::mirrored)?), ""),
     ];

@@ -287,7 +287,7 @@ fn the_paper_is_all_of_it() {
     ];
     assert_eq!(names, expected);
     let cell = report.tables[0].cell("two", "LDR PSNR (ref.), published");
-    assert_eq!(cell, Some(&Cell::missing("not at hand")));
+    assert_eq!(cell, Some(&Cell::missing("not available")));
     let ablation = &report.tables[5];
     assert_eq!(
         ablation.cell("one", "LDR PSNR, autoencoder (ref.)").and_then(Cell::number),

@@ -139,7 +139,7 @@ impl Encoder {
         if let Some(image) = images.iter().find(|image| image.len() != 3 * grid.len()) {
             let (Equirect { width, height }, count) = (grid, image.len());
             return Err(Error::invalid(format!(
-                "{count} values are no panorama of {width} × {height} in RGB"
+                "{count} values are not a panorama of {width} × {height} in RGB"
             )));
         }
         let directions = self.layout.directions(self)?;

@@ -16,7 +16,7 @@ const DAMPING: f64 = 1e-2;
 const MOST_DAMPING: f64 = 1e8;
 /// Least diagonal element of D, in parts of the largest: coordinates that hardly matter stay where they are.
 const FLOOR: f64 = 1e-6;
-/// A fall of the loss by less than this fraction is no progress, and so many of them in a row end the search.
+/// A fall of the loss by less than this fraction is not progress, and so many of them in a row end the search.
 const PROGRESS: f64 = 1e-4;
 const PATIENCE: u32 = 3;
 

@@ -10,7 +10,7 @@ pub enum ExposureForm {
     /// Radiance times e^s.
     #[default]
     Natural,
-    /// The authors' program exponentiates twice: radiance times exp(e^s), never below 1 (MODEL, Rendered images).
+    /// The reference implementation exponentiates twice: radiance times exp(e^s), never below 1 (MODEL, Rendered images).
     Reference,
 }
 

@@ -18,7 +18,7 @@ pub enum ShadedLoss {
         /// ε over the mean of the target.
         floor: f32,
     },
-    /// The authors' figure (MODEL, Rendered images): 100 mean |ln R − ln T| over all pixels, where those that show nothing are
+    /// The reference implementation's figure (MODEL, Rendered images): 100 mean |ln R − ln T| over all pixels, where those that show nothing are
     /// equal.
     ReferenceLog,
     /// RENI++'s demonstration: `mse` mean (g(R) − g(T))² + `cosine` (1 − mean cos(g(R), g(T))) over all pixels, with g(x) the

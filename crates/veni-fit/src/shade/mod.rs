@@ -48,7 +48,7 @@ pub use raster::Mesh;
 pub use surface::Surface;
 pub use transfer::{DEFAULT_MEMORY, Transfer};
 
-/// Physics, or the authors' program to the letter.
+/// Physics, or the reference implementation to the letter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ShadingForm {
     /// Reflected radiance Σ f L cos θ ω with normalised f; the view vector points to the camera; pixels that show no

@@ -28,8 +28,8 @@ impl Model {
     /// # Panics
     /// As [`Model::pretrained`].
     #[allow(clippy::expect_used, reason = "the bytes are part of the program and tested with it")]
-    pub fn pretrained_of(numbers: usize) -> Option<Self> {
-        let (_, bytes) = FILES.iter().find(|(size, _)| *size == numbers)?;
+    pub fn pretrained_of(dimension: usize) -> Option<Self> {
+        let (_, bytes) = FILES.iter().find(|(size, _)| *size == dimension)?;
         Some(Self::from_bytes(bytes).expect("embedded model"))
     }
 

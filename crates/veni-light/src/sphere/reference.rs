@@ -1,4 +1,4 @@
-//! The directions and samplers of the authors' program, for their weights and their numbers only; veni itself
+//! The directions and samplers of the reference implementation, for their weights and their numbers only; veni itself
 //! uses [`Stripes`](super::Stripes) and [`Equirect`].
 //!
 //! Two frames besides the native one occur there. The *camera* frame d belongs to the decoder: the image centre
@@ -25,7 +25,7 @@ pub fn encoder_to_native([x, y, z]: [f32; 3]) -> [f32; 3] {
 
 /// The decoder's directions for an image, camera frame, row-major: with s = 2(i+½)/W − 1 and θ = π(j+½)/H,
 /// d = (sin πs sin θ, −cos πs sin θ, cos θ), normalised once more. In single precision, step by step as the
-/// authors' program does: a latent fit with large steps amplifies the last bit of a direction ten-thousandfold.
+/// reference implementation does: a latent fit with large steps amplifies the last bit of a direction ten-thousandfold.
 /// (What remains is the last bit of the sine itself, in one row or column of ten.)
 pub fn decoder_directions(grid: Equirect) -> Vec<[f32; 3]> {
     let (w, h) = (grid.width as f32, grid.height as f32);
@@ -162,7 +162,7 @@ pub fn double_sunflower(patches: usize, samples: usize, fov_degrees: f64) -> Vec
     out
 }
 
-/// The authors' rotation by pitch about x and yaw about z, rows first:
+/// The reference implementation's rotation by pitch about x and yaw about z, rows first:
 /// [[cos y, sin y, 0], [−sin y, cos y, 0], [0, 0, 1]] · [[1, 0, 0], [0, cos p, sin p], [0, −sin p, cos p]].
 pub fn pitch_yaw(pitch: f32, yaw: f32) -> [[f32; 3]; 3] {
     let ((sp, cp), (sy, cy)) = (pitch.sin_cos(), yaw.sin_cos());

@@ -31,7 +31,7 @@ impl Train {
         }
         if !described {
             bail!(
-                "{}: a run goes on with its own settings: leave the other options out, or give --data and all that \
+                "{}: a run continues with its own settings: leave the other options out, or give --data and all that \
                  it was begun with",
                 self.out.display()
             );

@@ -82,7 +82,7 @@ impl Trainer {
         let state = if path.exists() { Some(checkpoint::load(&path)?) } else { None };
         if let (None, Some(init)) = (&state, &config.init) {
             return Err(Error::invalid(format!(
-                "{}: is missing, and with it the weights that the run took from {}; begin the run anew",
+                "{}: is missing, and with it the weights that the run took from {}; start the run over",
                 path.display(),
                 init.model.display()
             )));

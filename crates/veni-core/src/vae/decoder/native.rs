@@ -139,7 +139,7 @@ impl Native {
                 + match (matrices.remove(&name), vectors.remove(&name)) {
                     (Some(matrix), _) => pair(matrix, gradient),
                     (_, Some(vector)) => pair(vector, gradient),
-                    _ => unreachable!("{name} is no tensor of a decoder"),
+                    _ => unreachable!("{name} is not a tensor of a decoder"),
                 };
         }
         total

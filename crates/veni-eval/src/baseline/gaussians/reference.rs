@@ -43,7 +43,7 @@ impl Grid {
         self.len() == 0
     }
 
-    /// The authors' start: all 0 but ln λ = ln(π/rows).
+    /// The reference implementation's start: all 0 but ln λ = ln(π/rows).
     pub fn start(self) -> Vec<f64> {
         [0.0, 0.0, 0.0, 0.0, 0.0, (PI / self.rows as f64).ln()].repeat(self.len())
     }

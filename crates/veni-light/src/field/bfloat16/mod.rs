@@ -1,7 +1,7 @@
 //! Matrix products of training in bfloat16: mixed precision where the processor has it.
 //!
 //! bfloat16 is f32 without its last 16 bits: the same range, eight significant bits. Both factors of every product are
-//! rounded to it, to nearest and ties to even; sums, and everything that is no matrix product (encoding, norms, ReLU,
+//! rounded to it, to nearest and ties to even; sums, and everything that is not a matrix product (encoding, norms, ReLU,
 //! losses, the weights that are trained), stay in f32. x86 processors with AVX512-BF16 (Zen 4, Cooper Lake, Sapphire
 //! Rapids and later) multiply and add pairs at twice the rate of f32.
 //!

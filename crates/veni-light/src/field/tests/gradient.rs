@@ -80,7 +80,7 @@ fn the_papers_size_agrees_too() {
 
 #[test]
 fn a_wrong_sign_in_the_target_is_seen() {
-    // the comparison above is no rubber stamp: the gradient at another latent does not pass it
+    // the comparison above is not a rubber stamp: the gradient at another latent does not pass it
     let model = odd(2, 16, VnReluForm::Projection);
     let [one, other] = [1, 2].map(|seed| Latent::from_seed(&Prior::standard(2), seed));
     let directions = directions(40);
