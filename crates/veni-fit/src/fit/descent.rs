@@ -3,7 +3,7 @@
 use super::FitResult;
 use super::adam::Variable;
 use super::config::{FitConfig, Method};
-use super::levenberg_marquardt::{Search, Slopes};
+use super::levenberg_marquardt::{QuadraticModel, Search};
 use super::network::{Evaluation, ImageLoss, Network};
 use super::pixel::PixelLoss;
 use super::plateau::PlateauDetector;
@@ -57,13 +57,13 @@ struct Penalty<'a> {
 }
 
 impl Penalty<'_> {
-    /// Its value and slopes.
+    /// Its value and gradient.
     fn at(&self, vectors: &[[f32; 3]]) -> (f64, Vec<f64>) {
         if self.scale == 0.0 {
             return (0.0, vec![0.0; 3 * vectors.len()]);
         }
-        let (energy, slopes) = self.prior.energy(vectors);
-        (self.scale * energy, slopes.as_flattened().iter().map(|s| self.scale * s).collect())
+        let (energy, gradient) = self.prior.energy(vectors);
+        (self.scale * energy, gradient.as_flattened().iter().map(|s| self.scale * s).collect())
     }
 
     /// Its second derivatives, [3N, 3N]: the same everywhere, since it is a quadratic.
@@ -80,14 +80,14 @@ impl Penalty<'_> {
         rows
     }
 
-    /// Added to the losses and slopes of all images.
+    /// Added to the losses and gradients of all images.
     fn add_to(&self, vectors: &[f32], found: &mut Evaluation) {
         let count = 3 * self.prior.latent_vectors();
         let each = vectors.chunks_exact(count).zip(&mut found.losses);
-        for ((z, loss), slopes) in each.zip(found.gradient.vectors.chunks_exact_mut(count)) {
+        for ((z, loss), gradient) in each.zip(found.gradient.vectors.chunks_exact_mut(count)) {
             let (value, by) = self.at(z.as_chunks().0);
             *loss += value;
-            slopes.iter_mut().zip(by).for_each(|(slope, by)| *slope += by);
+            gradient.iter_mut().zip(by).for_each(|(g, by)| *g += by);
         }
     }
 }
@@ -159,10 +159,10 @@ impl Descent<'_> {
         trace: &mut Trace<'_>,
     ) -> Result<Vec<Latent>> {
         let (curvature, free) = (self.penalty.curvature(), self.config.free_exposure);
-        let evaluate = |latent: &Latent, image: &PixelLoss<'_>| -> Result<Slopes> {
+        let evaluate = |latent: &Latent, image: &PixelLoss<'_>| -> Result<QuadraticModel> {
             let found = self.network.equations(latent, image)?;
             let (value, by) = self.penalty.at(&latent.vectors);
-            Ok(Slopes::new(found, free).plus(value, &by, &curvature))
+            Ok(QuadraticModel::new(found, free).plus(value, &by, &curvature))
         };
         let begin = |(latent, image): (&Latent, &PixelLoss<'_>)| -> Result<Search> {
             Ok(Search::new(latent.clone(), evaluate(latent, image)?))

@@ -195,16 +195,16 @@ impl Transfer {
                 let sums = kernel::dot(arch, rows, light);
                 let mut factors = [[0.0; 3]; ROWS];
                 self.each_pixel(groups, &sums, |pixel, first, value| {
-                    let (part, slope) = loss(pixel.at, value.map(|v| v.max(self.floor)));
+                    let (part, by_value) = loss(pixel.at, value.map(|v| v.max(self.floor)));
                     total += part;
                     for c in 0..3 {
-                        let slope = if value[c] < self.floor { 0.0 } else { slope[c] };
+                        let by_value = if value[c] < self.floor { 0.0 } else { by_value[c] };
                         match self.lobes {
-                            LobeRows::Diffuse => factors[first][c] += slope * pixel.diffuse[c],
-                            LobeRows::Mixed { .. } => factors[first][c] += slope,
+                            LobeRows::Diffuse => factors[first][c] += by_value * pixel.diffuse[c],
+                            LobeRows::Mixed { .. } => factors[first][c] += by_value,
                             LobeRows::Both { specular } => {
-                                factors[first][c] += slope * pixel.diffuse[c];
-                                factors[first + 1][c] += slope * specular[c];
+                                factors[first][c] += by_value * pixel.diffuse[c];
+                                factors[first + 1][c] += by_value * specular[c];
                             }
                         }
                     }

@@ -123,7 +123,7 @@ pub fn reference_planes(
     Tensor::cat(terms, 0).sum() / count as f64
 }
 
-/// The reference implementation's loss on images: their mask multiplied into both before filtering (so that its slope enters),
+/// The reference implementation's loss on images: their mask multiplied into both before filtering (so that its gradient enters),
 /// rows and columns exchanged (so that their second stencil acts along the horizon). `[B, H, W, 3]` → `[1]`.
 pub fn reference(prediction: Tensor<4>, target: Tensor<4>, scales: usize) -> Tensor<1> {
     let [batch, height, width, channels] = prediction.dims();

@@ -116,16 +116,16 @@ impl Native {
         self.perceptron.forward(&self.images, &self.split(directions, rays)).into_flattened()
     }
 
-    /// A scalar on the graph with the gradient of Σ slope · log radiance; its value means nothing. Directions as in
-    /// [`Native::forward`], slopes `[B, R, 3]`.
+    /// A scalar on the graph with the gradient of Σ gradient · log radiance; its value means nothing. Directions as in
+    /// [`Native::forward`], gradients `[B, R, 3]`.
     ///
     /// # Panics
     /// If shapes disagree.
-    pub fn backward(self, directions: &[[f32; 3]], rays: usize, slopes: &[f32]) -> Tensor<1> {
-        let (count, images) = (slopes.len(), self.images.len());
-        assert!(count == 3 * images * rays, "{count} slopes for {images} images of {rays} directions");
+    pub fn backward(self, directions: &[[f32; 3]], rays: usize, gradients: &[f32]) -> Tensor<1> {
+        let (count, images) = (gradients.len(), self.images.len());
+        assert!(count == 3 * images * rays, "{count} gradients for {images} images of {rays} directions");
         let directions = self.split(directions, rays);
-        let found = self.perceptron.backward(&self.images, &directions, slopes.as_chunks().0);
+        let found = self.perceptron.backward(&self.images, &directions, gradients.as_chunks().0);
         let vectors = found.images.iter().flat_map(|i| &i.vectors).flat_map(|[x, y]| [*x, *y, 0.0]);
         let mut total = pair(self.latent, vectors.collect());
         let hidden = self.added[0].dims()[1];

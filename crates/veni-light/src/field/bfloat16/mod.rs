@@ -22,7 +22,7 @@ const LANES: usize = 16;
 type Row = [[f32; LANES]; super::block::VECTORS];
 /// Outputs of a panel of the sums x gᵀ.
 type Wide = [[f32; LANES]; 2];
-/// Pairs of directions of such a panel, turned round.
+/// Pairs of directions of such a panel, transposed.
 type WidePairs = [[u32; LANES]; 2];
 
 /// Proof that this processor multiplies in bfloat16.
@@ -37,8 +37,8 @@ impl Bfloat16 {
 
     /// Turns the rows of a block's gradient round for [`Bfloat16::add`]: panel by panel, in each pair of directions by
     /// pair. What `out` holds beyond the last row stays.
-    pub(super) fn turn_round(self, rows: &[Row], out: &mut [WidePairs]) {
-        kernels::turn_round(self, rows, out);
+    pub(super) fn transpose(self, rows: &[Row], out: &mut [WidePairs]) {
+        kernels::transpose(self, rows, out);
     }
 
     /// Adds x gᵀ of a block to `sums`, which lie panel by panel, in each input by input.

@@ -48,7 +48,7 @@ pub(super) fn product<const ADD: bool, const RELU: bool>(
     unsafe { panels::<ADD, RELU>(matrix, bias, x, y) }
 }
 
-pub(super) fn turn_round(_token: Bfloat16, rows: &[Row], out: &mut [WidePairs]) {
+pub(super) fn transpose(_token: Bfloat16, rows: &[Row], out: &mut [WidePairs]) {
     // SAFETY: as in `product`.
     unsafe { transpose(rows, out) }
 }

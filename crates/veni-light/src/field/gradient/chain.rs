@@ -20,7 +20,7 @@ pub(super) fn to_latent(weights: &Weights, folded: &Folded, sums: &Sums) -> Grad
     let vectors = (folded.vectors.iter().zip(&sums.vectors).zip(condition.as_chunks::<3>().0)).map(
         |(([x, y], [dx, dy]), [a, b, z])| {
             let (x, y) = (f64::from(*x), f64::from(*y));
-            let [p, q] = weights.invariant.slope(x.hypot(y));
+            let [p, q] = weights.invariant.derivative(x.hypot(y));
             let radial = a * p + b * q;
             [(dx + radial * x) as f32, (dy + radial * y) as f32, *z as f32]
         },

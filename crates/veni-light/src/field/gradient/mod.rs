@@ -28,8 +28,8 @@ use super::aligned::Aligned;
 use super::{Field, tasks};
 use backward::{Backward, Sums};
 
-pub(super) use normal::Joint;
-pub use normal::{Curved, NormalEquations};
+pub(super) use normal::ValueOutput;
+pub use normal::{LocalQuadratic, NormalEquations};
 pub(super) use transposed::Transposed;
 
 /// Fewest directions of one task: a few blocks, so that all cores finish together.

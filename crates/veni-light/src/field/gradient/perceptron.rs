@@ -101,18 +101,18 @@ impl Perceptron {
         out
     }
 
-    /// The gradient of Σ slope · log radiance; `slopes` are as [`Perceptron::forward`] returns log radiance.
+    /// The gradient of Σ gradient · log radiance; `gradients` are as [`Perceptron::forward`] returns log radiance.
     pub fn backward(
         &self,
         images: &[Conditioned],
         directions: &[&[[f32; 3]]],
-        slopes: &[[f32; 3]],
+        gradients: &[[f32; 3]],
     ) -> Gradients {
         let mlp = &self.mlp;
         let all: usize = directions.iter().map(|d| d.len()).sum();
         let task = all.div_ceil(TASKS).max(BACKWARD);
         let mut parts = Vec::new();
-        let mut rest = slopes;
+        let mut rest = gradients;
         for (i, (image, directions)) in images.iter().zip(directions).enumerate() {
             let even = directions.len().div_ceil(directions.len().div_ceil(task).max(1)).max(1);
             for directions in directions.chunks(even) {
@@ -124,14 +124,14 @@ impl Perceptron {
         let parts = tasks::map(
             parts.into_iter(),
             Aligned::default,
-            |scratch, (i, Conditioned(folded), directions, slopes)| {
+            |scratch, (i, Conditioned(folded), directions, gradients)| {
                 let mut sums = Sums::new(mlp, folded.vectors.len());
                 let mut weights = WeightSums::new(mlp);
                 pulp::Arch::new().dispatch(Backward {
                     mlp,
                     folded,
                     directions,
-                    loss: &|i, _| (0.0, slopes[i]),
+                    loss: &|i, _| (0.0, gradients[i]),
                     sums: &mut sums,
                     weights: Some(&mut weights),
                     scratch,
