@@ -7,7 +7,7 @@
 use burn::tensor::{Device, Gradients, Tensor};
 
 use crate::train::batch::Batch;
-use crate::train::config::DecoderBy;
+use crate::train::config::DecoderBackend;
 use crate::train::loss::{Loss, LossTerms, Term};
 use crate::train::network::{Network, Prepared};
 use crate::train::rays::RayBatch;
@@ -23,12 +23,12 @@ pub(super) fn gradients(
     network: &Network,
     batch: &Prepared,
     loss: &Loss,
-    by: DecoderBy,
+    by: DecoderBackend,
     device: &Device,
 ) -> (LossTerms, Gradients) {
     let prepare = |decoder: &Decoder, latent| {
         let native = decoder.native(latent).expect("a network that folds");
-        if by == DecoderBy::KernelsBfloat16 {
+        if by == DecoderBackend::KernelsBfloat16 {
             native.in_bfloat16().expect("checked by the run")
         } else {
             native

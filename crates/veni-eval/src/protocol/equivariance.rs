@@ -37,12 +37,12 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     let mut columns: Vec<Vec<(&'static str, Cell)>> = Vec::new();
     let mut curves = Vec::new();
     for subject in run.subjects {
-        run.watch.begin("part", subject.name(), 0, 2);
+        run.observer.begin("part", subject.name(), 0, 2);
         let (encoder, curve) = encoder(run, subject)?;
-        run.watch.advance(1);
+        run.observer.advance(1);
         curves.extend(curve);
         columns.push(encoder.into_iter().chain(decoder(run, subject)?).collect());
-        run.watch.advance(1);
+        run.observer.advance(1);
     }
     let measures = columns.first().map_or(0, Vec::len);
     for row in 0..measures {

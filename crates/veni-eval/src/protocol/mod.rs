@@ -65,12 +65,12 @@ impl Default for Settings {
     }
 }
 
-/// Hears how far an evaluation has come. Several threads tell it.
-pub trait Watch: Sync {
+/// Observer of an evaluation's progress. Reported from several threads.
+pub trait Observer: Sync {
     /// A task begins that takes `total` units ("panorama"), `done` of them kept from an earlier run.
     fn begin(&self, unit: &'static str, task: &str, done: usize, total: usize);
 
-    /// So many more units are done.
+    /// This many more units are done.
     fn advance(&self, units: usize);
 }
 
@@ -91,8 +91,8 @@ pub struct Evaluation<'a> {
     pub store: &'a Store,
     /// The folder of figures.
     pub figures: &'a Path,
-    /// Who hears of progress.
-    pub watch: &'a dyn Watch,
+    /// Observer of progress.
+    pub observer: &'a dyn Observer,
 }
 
 /// What a protocol found.

@@ -17,7 +17,7 @@ pub(super) fn optimise(
     prior: Option<&Prior>,
     start: &[Latent],
     config: &FitConfig,
-    watch: &mut dyn FnMut(u64, f64),
+    observer: &mut dyn FnMut(u64, f64),
 ) -> Result<FitResult> {
     let n = start.first().map_or(0, |z| z.vectors.len());
     let standard = Prior::standard(n);
@@ -29,7 +29,7 @@ pub(super) fn optimise(
     };
     let [explore, finish] = config.plan(n, pixels.is_some());
     let descent = Descent { network, loss, penalty: &penalty, config };
-    let mut trace = Trace { losses: Vec::new(), watch };
+    let mut trace = Trace { losses: Vec::new(), observer };
     let mut latents = start.to_vec();
     if explore > 0 {
         latents = descent.adam(&latents, explore, &mut trace)?;
@@ -103,7 +103,7 @@ struct Descent<'a> {
 /// The losses so far, and who is told of them.
 struct Trace<'a> {
     losses: Vec<f64>,
-    watch: &'a mut dyn FnMut(u64, f64),
+    observer: &'a mut dyn FnMut(u64, f64),
 }
 
 impl Trace<'_> {
@@ -116,7 +116,7 @@ impl Trace<'_> {
                 "the fit's loss is {value} at step {step}; lower its learning rate, or start elsewhere"
             )));
         }
-        (self.watch)(step, value);
+        (self.observer)(step, value);
         self.losses.push(value);
         Ok(())
     }

@@ -116,8 +116,8 @@ fn reflected(coordinate: f32, n: usize) -> Pair {
     Pair::new(low as usize, (low as usize + 1).min(n - 1), f64::from(at - low))
 }
 
-/// The golden-angle spiral on the unit disk: point i at radius √((i+½)/n) and angle i·π(3 − √5).
-pub fn sunflower_disk(n: usize) -> Vec<[f32; 2]> {
+/// The Fibonacci (golden-angle) lattice on the unit disk: point i at radius √((i+½)/n) and angle i·π(3 − √5).
+pub fn fibonacci_disk(n: usize) -> Vec<[f32; 2]> {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     (0..n)
         .map(|i| {
@@ -130,7 +130,7 @@ pub fn sunflower_disk(n: usize) -> Vec<[f32; 2]> {
 
 /// The golden spiral on the sphere: z = 1 − 2(i+½)/n, azimuth π(1 + √5)(i+½), the latter in single precision,
 /// whose rounding shows from a hundred points on.
-pub fn sunflower_sphere(n: usize) -> Vec<[f32; 3]> {
+pub fn fibonacci_sphere(n: usize) -> Vec<[f32; 3]> {
     let turn = (std::f64::consts::PI * (1.0 + 5f64.sqrt())) as f32;
     (0..n)
         .map(|i| {
@@ -142,14 +142,14 @@ pub fn sunflower_sphere(n: usize) -> Vec<[f32; 3]> {
         .collect()
 }
 
-/// Patches of a [`sunflower_disk`] on planes that touch the sphere, [patches, samples] row-major, not normalised.
-/// The centre of a patch is c = (s_y, s_z, −s_x) of a [`sunflower_sphere`] point s; its disk has the radius
+/// Patches of a [`fibonacci_disk`] on planes that touch the sphere, [patches, samples] row-major, not normalised.
+/// The centre of a patch is c = (s_y, s_z, −s_x) of a [`fibonacci_sphere`] point s; its disk has the radius
 /// tan(fov/2) and is spanned by e₁ = c × z normalised and e₂ = e₁ × c.
-pub fn double_sunflower(patches: usize, samples: usize, fov_degrees: f64) -> Vec<[f32; 3]> {
+pub fn double_fibonacci(patches: usize, samples: usize, fov_degrees: f64) -> Vec<[f32; 3]> {
     let radius = (0.5 * fov_degrees.to_radians()).tan();
-    let disk = sunflower_disk(samples);
+    let disk = fibonacci_disk(samples);
     let mut out = Vec::with_capacity(patches * samples);
-    for [sx, sy, sz] in sunflower_sphere(patches) {
+    for [sx, sy, sz] in fibonacci_sphere(patches) {
         let c = [sy, sz, -sx].map(f64::from);
         let length = c[0].hypot(c[1]).max(f64::MIN_POSITIVE);
         let e1 = [c[1] / length, -c[0] / length, 0.0];

@@ -3,7 +3,7 @@
 use veni_data::{AugmentConfig, DataConfig};
 use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 use crate::train::config::{
-    DecoderBy, DeviceKind, Devices, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig,
+    DecoderBackend, DeviceKind, Devices, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig,
 };
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
@@ -51,7 +51,7 @@ pub(super) fn small(latent_vectors: usize) -> TrainConfig {
         order: Order::Shuffle,
         device: DeviceKind::Flex,
         devices: Devices::default(),
-        decoder_by: DecoderBy::Kernels,
+        decoder_backend: DecoderBackend::Kernels,
         ema_decay: 0.999,
         model: ModelConfig {
             kind: ModelKind::Veni,

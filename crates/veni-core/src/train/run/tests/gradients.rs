@@ -37,7 +37,7 @@ fn gradients_match(run: &Path, config: TrainConfig) {
     let device = DeviceKind::Flex.device().unwrap().autodiff();
     let loss_of = &Network::loss(trainer.config(), &device);
     let value = |veni: &Network| veni.terms(&batch, loss_of, &device).total();
-    let both = [DecoderBy::Tensors, DecoderBy::Kernels].map(|by| {
+    let both = [DecoderBackend::Tensors, DecoderBackend::Kernels].map(|by| {
         let (terms, gradients) = veni.gradients(&batch, loss_of, by, &device);
         (terms.total().into_scalar::<f32>(), weights::gradients(&veni, "", &gradients))
     });
