@@ -1,4 +1,4 @@
-//! What the user is told, and where: results on stdout, notes and errors on stderr.
+//! What is reported to the user, and where: results on stdout, notes and errors on stderr.
 
 use std::fmt::Display;
 use std::io::{self, Write};

@@ -14,7 +14,7 @@ use veni_light::sphere::Equirect;
 pub struct FitSettings {
     /// Objective, steps, rates.
     pub config: FitConfig,
-    /// The fit sees means over so many by so many pixels.
+    /// The fit sees means over squares of this many pixels a side.
     pub factor: usize,
 }
 

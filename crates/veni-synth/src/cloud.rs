@@ -32,7 +32,7 @@ pub(super) struct Lighting {
     pub(super) direct: Vec3,
     /// Mean radiance of the sky above the layer.
     pub(super) sky: Vec3,
-    /// Radiance that the ground sends up.
+    /// Radiance that the ground reflects upwards.
     pub(super) ground: Vec3,
 }
 

@@ -102,7 +102,7 @@ struct Image<'a> {
 }
 
 impl Image<'_> {
-    /// The image losses of log radiance, and their sum's derivatives by it.
+    /// The image losses of log radiance, and their sum's derivatives with respect to it.
     fn terms(&self, loss: &Loss, decoded: &[f32], device: &Device) -> (LossTerms, Vec<f32>) {
         let prediction: Tensor<4> = tensor(decoded, self.shape, device).require_grad();
         let terms = loss.image_terms(self.step, prediction.clone(), tensor(self.target, self.shape, device));

@@ -1,5 +1,5 @@
 //! The systems that VENI is compared with: an image's own expansion in spherical harmonics or spherical Gaussians, given
-//! as many numbers D as a latent has. No prior, no training, no tensors.
+//! the latent dimension D of a model. No prior, no training, no tensors.
 //!
 //! | system | what is expanded | numbers |
 //! |---|---|---|

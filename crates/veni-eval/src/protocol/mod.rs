@@ -2,14 +2,14 @@
 //!
 //! | protocol | question |
 //! |---|---|
-//! | [`reconstruction`] | how much of a panorama survives D numbers? |
+//! | [`reconstruction`] | how much of a panorama survives a latent of dimension D? |
 //! | [`uniqueness`] | do two fits of one panorama end in the same place of latent space? |
 //! | [`consistency`] | are latents that are far apart panoramas that are far apart? |
 //! | [`interpolation`] | is the way from one panorama to another even? |
 //! | [`equivariance`] | does the latent turn with the panorama? |
 //! | [`dataset_size`] | what is more training data worth? |
 //! | [`ablations`] | what is each part of the model worth? |
-//! | [`inverse_rendering`] | what does a shaded ball tell of the light on it? |
+//! | [`inverse_rendering`] | what does the rendered image of a ball tell of the light on it? |
 //! | [`paper`] | all of them, with published numbers beside ours |
 //!
 //! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image; a

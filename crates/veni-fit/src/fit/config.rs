@@ -96,7 +96,7 @@ pub enum Objective {
     /// (1 − `share`) · [`Objective::LogError`] + `share` · Σ ω m (L/L̄) ρ(P − I)/Σ ω m, L being a pixel's luminance, L̄ its
     /// mean over ω m, and ρ(e) = 2 (√(1 + e²) − 1): a pixel counts by its area and a little by the light that comes from
     /// it, where ρ (e² for small e, a line for large ones) keeps a sun that the decoder cannot follow from dragging the
-    /// rest along. For light that shall fall on something: a sun is a thousandth of the sphere and half of its light.
+    /// rest along. For light that is to illuminate something: a sun is a thousandth of the sphere and half of its light.
     Energy {
         /// Part of the weight that goes by light, in [0, 1].
         share: f64,

@@ -100,7 +100,7 @@ struct Descent<'a> {
     config: &'a FitConfig,
 }
 
-/// The losses so far, and who is told of them.
+/// The losses so far, and the callback that gets them.
 struct Trace<'a> {
     losses: Vec<f64>,
     observer: &'a mut dyn FnMut(u64, f64),

@@ -56,7 +56,7 @@ pub fn fit(
     fit_with(decoder, target, start, config, None, &mut |_, _| {})
 }
 
-/// [`fit`] with a loss over whole images, which [`FitConfig::objective`] names, and an observer, who is told the number of
+/// [`fit`] with a loss over whole images, which [`FitConfig::objective`] names, and a progress callback, which gets the number of
 /// updates made and the loss, before each update.
 ///
 /// # Errors

@@ -132,7 +132,7 @@ fn white(image: &[f32], weights: &[f64]) -> f64 {
     f64::from(tonemap::quantile(&radiance, 0.98)).ln()
 }
 
-/// The sRGB curve of min(eˣ, 1), and its derivative by x.
+/// The sRGB curve of min(eˣ, 1), and its derivative with respect to x.
 fn display(x: f64) -> (f64, f64) {
     if x >= 0.0 {
         return (1.0, 0.0);

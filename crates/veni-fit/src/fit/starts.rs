@@ -70,7 +70,7 @@ pub fn best_light(
     })
 }
 
-/// The best of the fits that `fit` makes from each start; it is told the starts one by one, and an observer as [`fit_with`]'s.
+/// The best of the fits that `fit` makes from each start; it gets the starts one by one, and a callback as [`fit_with`]'s.
 ///
 /// # Errors
 /// Those of `fit`.

@@ -15,7 +15,7 @@ pub enum ExposureForm {
 }
 
 impl ExposureForm {
-    /// What is added to log radiance, and its derivative by s.
+    /// What is added to log radiance, and its derivative with respect to s.
     fn offset(self, s: f32) -> (f32, f64) {
         match self {
             Self::Natural => (s, 1.0),

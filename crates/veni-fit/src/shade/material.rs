@@ -152,7 +152,7 @@ impl Lobes {
                 if cosine <= 0.0 {
                     return 0.0;
                 }
-                // most pairs are far down the lobe: told without a root
+                // most pairs are far down the lobe: decided without a root
                 let half = add(light, self.view);
                 let (along, square) = (cosine + self.facing, dot(half, half));
                 if along <= 0.0 || along * along < self.cutoff * self.cutoff * square {

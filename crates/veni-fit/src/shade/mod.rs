@@ -8,7 +8,7 @@
 //!
 //! So a [`Transfer`] knows everything but L: it renders, and takes gradients back. A [`ShadedImage`] compares the
 //! result with a photograph and gives the gradient of a loss with respect to log radiance and exposure, which is all
-//! that a fit of a latent to a shaded image needs.
+//! that a fit of a latent to a rendered image needs.
 //!
 //! | here | what |
 //! |---|---|

@@ -18,7 +18,7 @@ pub const DEFAULT_MEMORY: usize = 512 << 20;
 /// Parts that an image is cut into, whatever the number of threads, so that sums have one order.
 const PARTS: usize = 32;
 
-/// Light to image: everything of a shaded image but the light.
+/// Light to image: everything of a rendered image but the light.
 ///
 /// Pixels of equal normal (and, with a specular lobe, equal ray) share a row. The matrix is kept if it fits into the
 /// memory allowed; else its rows are computed each time they are needed, which costs time and no memory. Clones share
@@ -181,7 +181,7 @@ impl Transfer {
         self.evaluate(&self.planes(radiance), |at, _| (0.0, gradient[at])).1
     }
 
-    /// One pass over the matrix: for every visible pixel `loss` is told its index and value and returns its part of the
+    /// One pass over the matrix: for every visible pixel `loss` gets its index and value and returns its part of the
     /// loss with the gradient; gives the sum and the gradient with respect to linear radiance.
     pub(super) fn evaluate(
         &self,

@@ -284,7 +284,7 @@ impl Variant {
     }
 }
 
-/// Tile and steps of "tiled" for the workgroup memory at hand; `None` if not even one directional input fits.
+/// Tile and steps of "tiled" for the workgroup memory available; `None` if not even one directional input fits.
 fn tiling(sizes: Sizes, memory: u32) -> Option<Tiling> {
     let groups = sizes.columns() / 2;
     let blocks = (TILED_THREADS / groups.min(TILED_THREADS)).min(TILE / 8);

@@ -4,7 +4,7 @@ use super::Prior;
 
 impl Prior {
     /// −ln p of the vectors up to a constant, |L⁻¹c|² + ½ |K⁻¹(z − μ)|² in the notation of [`Prior`], and its
-    /// derivatives by x, y, z of each. For [`Prior::standard`] it is ½ Σ |vector|².
+    /// derivatives with respect to x, y, z of each. For [`Prior::standard`] it is ½ Σ |vector|².
     ///
     /// # Panics
     /// If there are not N vectors.

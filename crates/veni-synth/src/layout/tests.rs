@@ -6,7 +6,7 @@ use crate::draw::Overrides;
 use crate::scene::SkyKind;
 use veni_image::luminance;
 
-/// Scenes of every place under this sky, so many of each.
+/// Scenes of every place under this sky, this many of each.
 fn scenes(sky: SkyKind, each: u64) -> impl Iterator<Item = Scene> {
     let of = move |place| {
         let overrides = Overrides { sky: Some(sky), place: Some(place), ..Overrides::default() };

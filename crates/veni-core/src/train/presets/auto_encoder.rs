@@ -70,7 +70,7 @@ pub(super) fn small(latent_vectors: usize) -> TrainConfig {
         data: DataConfig::default(),
         augment: varied(),
         loss_grid: LossGrid::Strided { factor: 2 },
-        // The gradient term is lighter than the paper's: 27 numbers cannot follow edges. What a viewer sees
+        // The gradient term is lighter than the paper's: a latent of dimension 27 cannot follow edges. What a viewer sees
         // (clamped, tonemapped) is asked for directly, which covers most of the colour too.
         loss: LossConfig {
             mage: WeightSchedule::Constant(0.1),

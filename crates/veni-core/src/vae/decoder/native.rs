@@ -2,7 +2,7 @@
 //! tensor operations.
 //!
 //! Conditioning stays on the graph: the latent's products, one vector per layer and image. What runs for every
-//! direction does not. Its gradients by everything it was given come back as constants G, and ⟨T, G⟩ summed over all
+//! direction does not. Its gradients with respect to everything it was given come back as constants G, and ⟨T, G⟩ summed over all
 //! of these tensors T is a scalar on the graph with the gradient of the loss: its backward pass goes on to the latent,
 //! to the encoder and to the parameters.
 
@@ -47,8 +47,8 @@ impl Decoder {
             self.latent_vectors,
             latent.dims()
         );
-        let told = invariants::vector(&self.config, self.condition.as_ref(), latent.clone());
-        let attention = layers.iter().map(|layer| layer.attention(told.clone()));
+        let features = invariants::vector(&self.config, self.condition.as_ref(), latent.clone());
+        let attention = layers.iter().map(|layer| layer.attention(features.clone()));
         let offsets = [self.input.bias.val()].into_iter().chain(layers.iter().map(|l| l.norm2.beta.val()));
         let offsets = offsets.map(|offset| offset.unsqueeze::<2>());
         let last = layers.last().expect("a decoder has at least one layer").norm2.beta.val();

@@ -11,10 +11,10 @@ use crate::field::aligned::Aligned;
 use crate::field::block::{Row, VECTORS};
 use crate::field::mlp::Mlp;
 
-/// ℓ and its derivatives by log radiance, given the direction's index and log radiance.
+/// ℓ and its derivatives with respect to log radiance, given the direction's index and log radiance.
 pub(super) type PixelLoss<'a> = dyn Fn(usize, [f32; 3]) -> (f64, [f32; 3]) + Sync + 'a;
 
-/// Gradients by what conditioning leaves of a latent, summed over directions.
+/// Gradients with respect to what conditioning leaves of a latent, summed over directions.
 #[derive(Clone, Debug)]
 pub(super) struct Sums {
     pub(super) loss: f64,
@@ -53,7 +53,7 @@ pub(super) struct Backward<'a> {
     pub(super) directions: &'a [[f32; 3]],
     pub(super) loss: &'a PixelLoss<'a>,
     pub(super) sums: &'a mut Sums,
-    /// Where the gradients by the weights are added, if they are wanted.
+    /// Where the gradients with respect to the weights are added, if they are wanted.
     pub(super) weights: Option<&'a mut WeightSums>,
     pub(super) scratch: &'a mut Aligned,
 }

@@ -5,7 +5,7 @@ use super::backward::Sums;
 use crate::field::Folded;
 use crate::field::weights::{Affine, Weights};
 
-/// The gradient by the latent, from the gradients by what conditioning left of it.
+/// The gradient with respect to the latent, from the gradients with respect to what conditioning left of it.
 pub(super) fn to_latent(weights: &Weights, folded: &Folded, sums: &Sums) -> Gradient {
     let n = weights.latent_vectors;
     let mut condition = vec![0.0f64; 3 * n];

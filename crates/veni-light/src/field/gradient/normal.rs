@@ -110,9 +110,9 @@ impl ValueOutput {
     }
 }
 
-/// From the gradient by what a layer's attention adds to that by the vectors' radii and heights.
+/// From the gradient with respect to what a layer's attention adds to that with respect to the vectors' radii and heights.
 ///
-/// The invariants a₁, a₂ of a vector depend on r² = x² + y² alone: their gradients by x and y are those by a
+/// The invariants a₁, a₂ of a vector depend on r² = x² + y² alone: their gradients with respect to x and y are those by a
 /// number ρ, times x and y.
 struct Chain<'a> {
     /// x, y of the vectors.

@@ -1,4 +1,4 @@
-//! Sums over directions of outer products x gᵀ: the gradient by a matrix [in, out].
+//! Sums over directions of outer products x gᵀ: the gradient with respect to a matrix [in, out].
 //!
 //! Activations lie feature by feature, a lane per direction, which suits a product with a matrix and not a sum over
 //! directions. So the gradient g of a block is transposed (direction by direction), and x is read as it lies,
@@ -16,7 +16,7 @@ const WIDE: usize = 2;
 /// Outputs of a panel for one direction, or of a sum for one input.
 pub(super) type Wide<S> = [<S as Simd>::f32s; WIDE];
 
-/// Panels for so many outputs.
+/// Panels for this many outputs.
 pub(super) fn panels<S: Simd>(outputs: usize) -> usize {
     outputs.div_ceil(WIDE * S::F32_LANES)
 }

@@ -72,7 +72,7 @@ pub(super) struct Pass<'a, S: Simd> {
     direction: &'a mut [Row<S>],
     /// Log radiance without the exposure, after [`Pass::forward`].
     pub(super) rgb: &'a mut [Row<S>],
-    /// The gradient by log radiance, for [`Pass::backward`]; its rows beyond the third are 0.
+    /// The gradient with respect to log radiance, for [`Pass::backward`]; its rows beyond the third are 0.
     pub(super) adjoint: &'a mut [Row<S>],
     /// What the output layer is given.
     last: &'a mut [Row<S>],

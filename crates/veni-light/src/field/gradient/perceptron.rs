@@ -1,8 +1,8 @@
-//! The decoder for several latents, with the gradient by its weights too: what training runs in place of tensor
+//! The decoder for several latents, with the gradient with respect to its weights too: what training runs in place of tensor
 //! operations.
 //!
 //! Conditioning (latent to [`Conditioned`]) is a few small matrices and stays with whoever trains; here is what runs for
-//! every direction. The way back takes the derivatives by log radiance, so that a loss may look at whole images. It
+//! every direction. The way back takes the derivatives with respect to log radiance, so that a loss may look at whole images. It
 //! goes forward once more, block by block: keeping the activations of a batch costs more time in memory than that.
 //!
 //! Directions are split into tasks by their number alone and tasks are added in order: the same bits whatever the
@@ -43,7 +43,7 @@ pub struct Gradients {
     pub weights: Vec<(String, Vec<f32>)>,
 }
 
-/// Gradients by what conditioning leaves of a latent.
+/// Gradients with respect to what conditioning leaves of a latent.
 #[derive(Clone, Debug)]
 pub struct ConditionedGradient {
     /// By x and y of the N latent vectors, through the directional input.

@@ -1,4 +1,4 @@
-//! Gradients by the weights that meet a direction, summed over directions.
+//! Gradients with respect to the weights that meet a direction, summed over directions.
 
 use pulp::Simd;
 
@@ -43,7 +43,7 @@ impl WeightSums {
 
 /// Workspace for the sums of one task, as the kernels leave them.
 pub(super) struct WeightWorkspace<'a, S: Simd> {
-    /// A block's gradient by the outputs of a matrix, direction by direction.
+    /// A block's gradient with respect to the outputs of a matrix, direction by direction.
     transposed: &'a mut [Wide<S>],
     bfloat16: Option<Bfloat16>,
     /// One per chunk of directional inputs.
