@@ -67,8 +67,8 @@ pub(crate) struct Fit {
     #[arg(long, value_name = "OUT")]
     completed: Option<PathBuf>,
 
-    /// Also write an uncertainty map, how much the starts disagree: standard deviation of log radiance (.exr, or .png as a heat map
-    /// up to one stop)
+    /// Also write an uncertainty map, how much the starts disagree: standard deviation of log radiance (.exr, or .png
+    /// as a heat map up to one stop)
     #[arg(long, value_name = "OUT")]
     uncertainty: Option<PathBuf>,
 

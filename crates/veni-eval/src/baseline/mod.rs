@@ -7,8 +7,8 @@
 //! | [`Kind::SphericalGaussians`] | the same, in lobes of either sign | 6 per lobe + 3 |
 //! | [`Kind::GaussianMixture`] | radiance, in positive lobes; error in log radiance | 6 per lobe + 3 |
 //!
-//! All are fitted to the whole sphere with every pixel weighted by its solid angle, in the native frame. The reference implementation's
-//! own forms, which golden files test, are in [`harmonics::reference`] and [`gaussians::reference`].
+//! All are fitted to the whole sphere with every pixel weighted by its solid angle, in the native frame. The reference
+//! implementation's own forms, which golden files test, are in [`harmonics::reference`] and [`gaussians::reference`].
 //!
 //! ```
 //! # use veni_core::{Result, baseline::{Baseline, Kind, Space}, sphere::Equirect};

@@ -28,8 +28,8 @@ pub trait Codec: Sync {
     /// Everything that decides a code besides the image: part of the key under which codes are kept.
     fn key(&self) -> Value;
 
-    /// The code, D values, for an image of log radiance at exposure 0 (3·W·H values). They depend on nothing else, so that what is
-    /// kept of one image stays true whatever it was coded beside.
+    /// The code, D values, for an image of log radiance at exposure 0 (3·W·H values). They depend on nothing else, so
+    /// that what is kept of one image stays true whatever it was coded beside.
     ///
     /// # Errors
     /// What the system says, naming itself.

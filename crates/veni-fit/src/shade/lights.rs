@@ -44,8 +44,8 @@ impl Lights {
         Self { directions: grid.directions(), solid_angles: solid_angles.collect() }
     }
 
-    /// The reference implementation's lights: one per pixel of a panorama, row-major, each with weight 1 whatever its solid angle
-    /// (MODEL, Rendered images), in their camera frame ([`reference::decoder_directions`]).
+    /// The reference implementation's lights: one per pixel of a panorama, row-major, each with weight 1 whatever its
+    /// solid angle (MODEL, Rendered images), in their camera frame ([`reference::decoder_directions`]).
     pub fn reference(grid: Equirect) -> Self {
         Self { directions: reference::decoder_directions(grid), solid_angles: vec![1.0; grid.len()] }
     }

@@ -65,8 +65,8 @@ impl NormalMap {
         (length > LENGTHS[0] && length < LENGTHS[1]).then(|| unit_f32(normal)).flatten()
     }
 
-    /// Each vector (x, y, z) becomes (x, −y, z): from maps whose green channel grows downwards (as the reference implementation
-    /// does with all of its maps).
+    /// Each vector (x, y, z) becomes (x, −y, z): from maps whose green channel grows downwards (as the reference
+    /// implementation does with all of its maps).
     #[must_use]
     pub fn flip_y(mut self) -> Self {
         self.normals.iter_mut().for_each(|n| n[1] = -n[1]);

@@ -169,7 +169,8 @@ impl Lobes {
         cosine * self.specular * (self.shininess * x.ln()).exp()
     }
 
-    /// n·h in single precision, step by step as in the reference implementation: with s = 500, the last bit of this number is
+    /// n·h in single precision, step by step as in the reference implementation: with s = 500, the last bit of this
+    /// number is
     /// 3e-5 of the result.
     fn reference_cosine(&self, light: Vector) -> f32 {
         let normalise = |v: [f32; 3]| {

@@ -12,8 +12,8 @@ const FILES: &[(usize, &[u8])] = &[
 ];
 
 impl Model {
-    /// The smallest model inside this library: 9 latent vectors (latent dimension D = 27), trained on outdoor panoramas, with its
-    /// encoder.
+    /// The smallest model inside this library: 9 latent vectors (latent dimension D = 27), trained on outdoor
+    /// panoramas, with its encoder.
     ///
     /// # Panics
     /// Never in a released build: a test decodes every embedded file.

@@ -41,8 +41,8 @@ pub(super) struct Settings {
     #[arg(long, value_name = "RATE[:LAST]", value_parser = rate)]
     rate: Option<(f64, Option<f64>)>,
 
-    /// Energy weight of the objective energy, the part of the weight that goes by light, 0 to 1: the more, the better suns and lamps and
-    /// the worse everything else [default: 0.05]
+    /// Energy weight of the objective energy, the part of the weight that goes by light, 0 to 1: the more, the better
+    /// suns and lamps and the worse everything else [default: 0.05]
     #[arg(long, value_name = "PART")]
     share: Option<f64>,
 

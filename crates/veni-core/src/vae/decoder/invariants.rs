@@ -1,4 +1,5 @@
-//! The latent's condition features: what the network is conditioned on apart from its products with the direction. MODEL (17).
+//! The latent's condition features: what the network is conditioned on apart from its products with the direction.
+//! MODEL (17).
 
 use super::Condition;
 use super::input::encode;

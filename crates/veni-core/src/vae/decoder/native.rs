@@ -2,9 +2,9 @@
 //! tensor operations.
 //!
 //! Conditioning stays on the graph: the latent's products, one vector per layer and image. What runs for every
-//! direction does not. Its gradients with respect to everything it was given come back as constants G, and ⟨T, G⟩ summed over all
-//! of these tensors T is a scalar on the graph with the gradient of the loss: its backward pass goes on to the latent,
-//! to the encoder and to the parameters.
+//! direction does not. Its gradients with respect to everything it was given come back as constants G, and ⟨T, G⟩
+//! summed over all of these tensors T is a scalar on the graph with the gradient of the loss: its backward pass goes on
+//! to the latent, to the encoder and to the parameters.
 
 use std::collections::BTreeMap;
 

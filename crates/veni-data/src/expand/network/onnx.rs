@@ -32,9 +32,9 @@ impl OnnxNetwork {
     /// Loads a network and tries it once, so that one that does not fit is refused before any work.
     ///
     /// # Errors
-    /// [`Error::Io`] if the file cannot be read; [`Error::Invalid`] if it is not an ONNX model or damaged, or if its input or
-    /// output is not as asked; [`Error::Unsupported`] for operators that the runtime does not have and for weights in
-    /// other files.
+    /// [`Error::Io`] if the file cannot be read; [`Error::Invalid`] if it is not an ONNX model or damaged, or if its
+    /// input or output is not as asked; [`Error::Unsupported`] for operators that the runtime does not have and for
+    /// weights in other files.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let meta = std::fs::metadata(path).map_err(|e| Error::io(path, "open", e))?;

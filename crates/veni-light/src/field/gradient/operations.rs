@@ -103,8 +103,8 @@ pub(super) fn accumulate_product<S: Simd>(simd: S, sum: S::f32s, a: &Row<S>, b: 
     (0..VECTORS).fold(sum, |sum, v| simd.mul_add_e_f32s(a[v], b[v], sum))
 }
 
-/// Backward of the encoding: the gradient with respect to every directional input ⟨z, d⟩, given to `each` as the input's index, the
-/// number of the vector in the row, and the vector.
+/// Backward of the encoding: the gradient with respect to every directional input ⟨z, d⟩, given to `each` as the
+/// input's index, the number of the vector in the row, and the vector.
 #[inline(always)]
 pub(super) fn unencode<S: Simd>(
     simd: S,

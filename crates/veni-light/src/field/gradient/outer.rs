@@ -33,8 +33,8 @@ pub(super) struct Outer<'a, S: Simd> {
 }
 
 impl<'a, S: Simd> Outer<'a, S> {
-    /// The rows of a gradient into `workspace`, panel by panel, in each direction by direction. What `workspace` holds beyond the
-    /// last row stays.
+    /// The rows of a gradient into `workspace`, panel by panel, in each direction by direction. What `workspace` holds
+    /// beyond the last row stays.
     #[inline(always)]
     pub(super) fn new(bfloat16: Option<Bfloat16>, rows: &[Row<S>], workspace: &'a mut [Wide<S>]) -> Self {
         match bfloat16 {

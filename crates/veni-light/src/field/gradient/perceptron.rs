@@ -2,8 +2,9 @@
 //! operations.
 //!
 //! Conditioning (latent to [`Conditioned`]) is a few small matrices and stays with whoever trains; here is what runs for
-//! every direction. The way back takes the derivatives with respect to log radiance, so that a loss may look at whole images. It
-//! goes forward once more, block by block: keeping the activations of a batch costs more time in memory than that.
+//! every direction. The way back takes the derivatives with respect to log radiance, so that a loss may look at whole
+//! images. It goes forward once more, block by block: keeping the activations of a batch costs more time in memory than
+//! that.
 //!
 //! Directions are split into tasks by their number alone and tasks are added in order: the same bits whatever the
 //! number of threads.
