@@ -210,7 +210,7 @@ impl Encoder {
             let tasks = tasks.zip(directions.chunks(share * each)).zip(samples.chunks(share * each));
             for_each(workers, tasks.collect(), |((x, directions), samples)| {
                 self.workspaces.with(|workspace| {
-                    self.project_in.add(directions, samples, self.coordinates, x, workspace)
+                    self.project_in.add(directions, samples, self.coordinates, x, workspace);
                 });
             });
             self.transformer.run(buffers, self.cls.is_some(), workers);
