@@ -124,7 +124,7 @@ fn every_protocol_runs_and_paper_runs_them_all() {
         "inverse-rendering",
     ];
     assert_eq!(names, expected);
-    assert_eq!(tables[0]["rows"][0]["LDR PSNR (ref.), published"], "not at hand");
+    assert_eq!(tables[0]["rows"][0]["LDR PSNR (ref.), published"], "not available");
     let results = kept(&dir);
     for (name, table) in expected.iter().zip(&tables) {
         let [alone] = &dir.json(&args(name, &data, &[]))[..] else { panic!("one table") };

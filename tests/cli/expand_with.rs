@@ -115,7 +115,7 @@ mod with_runtime {
             |model: &'static str| vec!["prepare", "in", "--size", "64", "-o", "data", "--expand-with", model];
         dir.refused(&with("none.onnx"), &["none.onnx", "cannot open"]);
         dir.write("text.onnx", "no network");
-        dir.refused(&with("text.onnx"), &["text.onnx", "no ONNX model"]);
+        dir.refused(&with("text.onnx"), &["text.onnx", "not an ONNX model"]);
         let grey = OnnxFile::default().value(11, "x", 1, &[1, 1, 0, 0]).value(12, "y", 1, &[]);
         dir.write("grey.onnx", grey.node("Relu", &["x"], "y", &[]).bytes());
         dir.refused(&with("grey.onnx"), &["grey.onnx", "1 x 1 x", "1 x 3 x H x W"]);
@@ -125,7 +125,7 @@ mod with_runtime {
         dir.refused(&sized("128x60"), &["--expand-size 128x60", "128x64"]);
         dir.refused(&[with("fixed.onnx"), vec!["--expand", "off"]].concat(), &["--expand off", "fixed.onnx"]);
 
-        // one that fits, and then gives what is no radiance: the picture is refused, and both are named
+        // one that fits, and then gives what is not radiance: the picture is refused, and both are named
         let nan = OnnxFile::image([0, 0]).constant("two", &[], &[2.0]).node("Sub", &["x", "two"], "z", &[]);
         dir.write("nan.onnx", nan.node("Sqrt", &["z"], "y", &[]).bytes());
         let run = dir.run(&[with("nan.onnx"), vec!["--json"]].concat());

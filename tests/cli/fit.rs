@@ -100,7 +100,7 @@ fn every_preset_and_objective_lowers_its_loss_and_seeds_name_starts() {
 }
 
 #[test]
-fn holes_are_completed_and_doubted() {
+fn holes_are_completed_and_uncertain() {
     let dir = Dir::new();
     // the right half is missing: by alpha, by a mask, by NaN
     let truth = sky(&dir, "alpha.exr", Some(|x| if x < 32 { 1.0 } else { 0.0 }));
@@ -113,14 +113,14 @@ fn holes_are_completed_and_doubted() {
         if x < 32 { (r, g, b) } else { (f32::NAN, g, b) }
     })
     .unwrap();
-    let images = ["--completed", "whole-again.exr", "--uncertainty", "doubt.exr", "--force"];
+    let images = ["--completed", "whole-again.exr", "--uncertainty", "std.exr", "--force"];
     let common = ["--resolution", "32x16", "-o", "a.json"];
     let alpha = fit(&dir, &[&["alpha.exr"], &common[..], &images[..]].concat());
     assert!((alpha["known_share"].as_f64().unwrap() - 0.5).abs() < 1e-3);
     assert_eq!(alpha["losses"].as_array().unwrap().len(), 4);
     assert_eq!(alpha["ldr_psnr"], Value::Null, "half a panorama has no score");
     let completed = readers::exr(&dir.path("whole-again.exr"));
-    let doubt = readers::exr(&dir.path("doubt.exr"));
+    let uncertainty = readers::exr(&dir.path("std.exr"));
     assert_eq!(completed.pixels.len(), 64 * 32);
     let mut off = 0;
     for (p, (found, true_value)) in completed.pixels.iter().zip(&truth.pixels).enumerate() {
@@ -130,7 +130,7 @@ fn holes_are_completed_and_doubted() {
     }
     assert!(off > 500, "what is unknown is not copied from what was hidden");
     let mean = |side: usize| {
-        let values = doubt.pixels.iter().enumerate().filter(|(p, _)| (p % 64 >= 32) == (side == 1));
+        let values = uncertainty.pixels.iter().enumerate().filter(|(p, _)| (p % 64 >= 32) == (side == 1));
         values.map(|(_, v)| f64::from(v[0])).sum::<f64>() / 1024.0
     };
     assert!(mean(1) > mean(0), "{} {}", mean(0), mean(1));

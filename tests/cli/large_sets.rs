@@ -1,4 +1,4 @@
-//! Training on more panoramas than memory shall hold.
+//! Training on more panoramas than memory may hold.
 
 use crate::util::*;
 

@@ -51,13 +51,13 @@ fn dirty(dir: &Dir) {
     // what cannot be used
     let whole = std::fs::read(original("ninomaru_teien")).unwrap();
     dir.write("in/cut.exr", &whole[..whole.len() / 2]);
-    dir.write("in/text.hdr", "this is no Radiance file");
+    dir.write("in/text.hdr", "this is not a Radiance file");
     dir.write("in/empty.exr", "");
     exr::prelude::write_rgb_file(dir.path("in/nan.exr"), 128, 64, |_, _| (f32::NAN, 1.0, 1.0)).unwrap();
     exr::prelude::write_rgb_file(dir.path("in/wide.exr"), 192, 64, |x, _| (x as f32, 1.0, 1.0)).unwrap();
     exr::prelude::write_rgb_file(dir.path("in/small.exr"), 64, 32, |x, _| (x as f32, 1.0, 1.0)).unwrap();
     dir.write("in/photo.avif", b"\0\0\0\x20ftypavif\0\0\0\0mif1");
-    // what is no image
+    // what is not an image
     dir.write("in/notes.txt", "remember");
     dir.write("in/.hidden.exr", "");
 }
@@ -225,7 +225,7 @@ fn runs_go_on_where_they_stopped_and_take_in_what_is_new() {
     });
     assert!(other.is_some());
 
-    // other settings and foreign folders are refused; --force begins anew and spares what is not its own
+    // other settings and foreign folders are refused; --force starts over and spares what is not its own
     let refused =
         |args: &[&str], words: &[&str]| dir.refused(&[&["prepare", "in", "-q"], args].concat(), words);
     refused(&["-o", "whole", "--size", "64"], &["whole", "128x64", "--force"]);

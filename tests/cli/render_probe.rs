@@ -1,4 +1,4 @@
-//! `render-probe`: shaded images, their normals and masks, and what is refused.
+//! `render-probe`: rendered images, their normals and masks, and what is refused.
 
 use std::path::Path;
 
@@ -79,7 +79,7 @@ fn a_sphere_in_a_furnace_shows_its_albedo_on_every_output() {
     assert!(seen > 1000, "the sphere fills the height: {seen}");
     // the sphere faces the camera, which looks along +x
     assert!((centre(&normals)[0] + 1.0).abs() < 0.01);
-    assert!(!exr.attributes.contains_key("envmap"), "a shaded image is no panorama");
+    assert!(!exr.attributes.contains_key("envmap"), "a rendered image is not a panorama");
     for image in [&exr, &normals] {
         let camera = veni_fit::shade::Camera::from_json(&image.attributes["veni:camera"]).unwrap();
         assert_eq!(camera.forward, [1.0, 0.0, 0.0]);

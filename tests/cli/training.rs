@@ -93,7 +93,7 @@ fn an_auto_decoder_is_trained_by_the_same_command() {
     // encoding needs an encoder, which it has not
     let failed = dir.run(&["encode", "sky.exr", "--model", "run", "-o", "sky.json"]);
     assert!(failed.code == Some(2) && failed.err.contains("encoder"), "{}", failed.err);
-    // what is begun anew leaves nothing of the old run behind
+    // what starts over leaves nothing of the old run behind
     dir.ok(&[&train_args(&data, "run", "1")[..], &["--force"]].concat());
     assert!(!dir.path("run/latents.safetensors").exists());
 }

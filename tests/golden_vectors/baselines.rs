@@ -136,11 +136,11 @@ fn fit(
         let count = (3 * target.len()) as f64;
         losses.push(residual.as_flattened().iter().map(|r| r * r).sum::<f64>() / count);
         let probe: Vec<_> = residual.into_iter().map(|r| r.map(|r| 2.0 * r / count)).collect();
-        let slope = gradient(&directions, &x, &probe);
+        let by_output = gradient(&directions, &x, &probe);
         if step == 0 {
-            compare(case, "out.grad0", &slope);
+            compare(case, "out.grad0", &by_output);
         }
-        x.iter_mut().zip(adam.step(&slope, number("lr"))).for_each(|(x, by)| *x += by);
+        x.iter_mut().zip(adam.step(&by_output, number("lr"))).for_each(|(x, by)| *x += by);
     }
     compare(case, "out.losses", &losses);
     compare(case, &format!("out.params{steps}"), &x);

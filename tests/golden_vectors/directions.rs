@@ -41,14 +41,14 @@ fn samplers(case: &Case) -> Outcome {
         flat(case, name, &lines.into_iter().map(reference::image_uv).collect::<Vec<_>>());
     }
     for (name, sizes) in outputs(case, "sunflower_disk_") {
-        flat(case, name, &reference::sunflower_disk(sizes[0]));
+        flat(case, name, &reference::fibonacci_disk(sizes[0]));
     }
     for (name, sizes) in outputs(case, "sunflower_3d_") {
-        flat(case, name, &reference::sunflower_sphere(sizes[0]));
+        flat(case, name, &reference::fibonacci_sphere(sizes[0]));
     }
     for (name, sizes) in outputs(case, "double_sunflower_") {
         let fov = case.number("fov_double_sunflower").expect("the field of view of the patches");
-        flat(case, name, &reference::double_sunflower(sizes[0], sizes[1], fov));
+        flat(case, name, &reference::double_fibonacci(sizes[0], sizes[1], fov));
     }
     let rotation = "out.R_pitch_axis0_yaw_axis2";
     if case.expects(rotation) {

@@ -118,7 +118,7 @@ impl Sizes {
 
     fn bindings(&self) -> (Vec<Binding>, Vec<Dead>) {
         let (n, h, layers) = (self.n, self.config.hidden, self.config.layers);
-        let (directional, told) = (self.config.direction_inputs(n), self.config.condition_inputs(n));
+        let (directional, conditional) = (self.config.direction_inputs(n), self.config.condition_inputs(n));
         let (mut all, mut dead) = (Vec::new(), Vec::new());
         let vn = [
             ("vn_proj_in.1.weight", "scale", [1, 1], false),
@@ -143,7 +143,7 @@ impl Sizes {
         };
         match self.config.conditioning {
             Conditioning::Concat => {
-                linear("net.0.linear".into(), "input".into(), directional + told, h);
+                linear("net.0.linear".into(), "input".into(), directional + conditional, h);
                 for l in 0..layers {
                     linear(format!("net.{}.linear", l + 1), format!("layers.{l}"), h, h);
                 }
@@ -154,7 +154,7 @@ impl Sizes {
                 let (count, width) = (self.config.mapping_layers, self.config.mapping_features);
                 for k in 0..=count {
                     let (from, to) = (
-                        if k == 0 { told } else { width },
+                        if k == 0 { conditional } else { width },
                         if k == count { 2 * h * (layers + 1) } else { width },
                     );
                     let key = format!("mapping_network.network.{}", 2 * k);
@@ -171,7 +171,7 @@ impl Sizes {
                 linear("fc".into(), "output".into(), h, 3);
                 for l in 0..layers {
                     let (theirs, ours) = (format!("layers.{l}"), format!("layers.{l}"));
-                    linear(format!("{theirs}.mha.value"), format!("{ours}.value"), told, h);
+                    linear(format!("{theirs}.mha.value"), format!("{ours}.value"), conditional, h);
                     linear(format!("{theirs}.mha.fc_out"), format!("{ours}.out"), h, h);
                     linear(format!("{theirs}.fc.0"), format!("{ours}.ff1"), h, h);
                     linear(format!("{theirs}.fc.2"), format!("{ours}.ff2"), h, h);
@@ -213,7 +213,7 @@ impl Sizes {
     }
 }
 
-/// The VN-ReLU of the authors' program that the case is from.
+/// The VN-ReLU of the reference implementation that the case is from.
 pub(crate) fn form(case: &Case) -> VnReluForm {
     if case.module().starts_with("RENI") { VnReluForm::ReferenceNormGuard } else { VnReluForm::Reference }
 }

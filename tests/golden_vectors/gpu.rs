@@ -57,7 +57,7 @@ fn decode(gpu: &Opened, model: &Model, latents: &[Latent], directions: &[[f32; 3
     read_back::buffer(&gpu.device, &gpu.queue, &to).unwrap_or_else(|e| panic!("{e}")).into_flattened()
 }
 
-/// Computes one case, or says why not; `None` if it is no field at all.
+/// Computes one case, or says why not; `None` if it is not a field at all.
 fn run(case: &Case, gpu: &Opened, shift: f32) -> Option<Verdict> {
     if !["VENIField", "RENIField"].contains(&case.module()) || !case.expects("out.rgb") {
         return None;

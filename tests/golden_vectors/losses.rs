@@ -49,7 +49,7 @@ fn weighted(case: &Case, device: &Device) {
         ldr_mse: weight("ldr_mse"),
     };
     let [_, height, width, _] = case.data("in.pred").shape[..] else {
-        panic!("in.pred is no batch of images")
+        panic!("in.pred is not a batch of images")
     };
     let loss = Loss::new(&config, height, width, device);
     let input = |name: &str| case.get(name).map(|_| ());
@@ -98,7 +98,7 @@ fn weighted(case: &Case, device: &Device) {
 /// `out.<operator>_<scales>_<plain|ssi>` and the raw filters, on [B, C, H, W].
 fn mage_pieces(case: &Case, device: &Device) {
     let [batch, channels, height, width] = case.data("in.pred").shape[..] else {
-        panic!("in.pred is no batch")
+        panic!("in.pred is not a batch")
     };
     let planes = |x: Tensor<4>| x.reshape([batch * channels, height, width]);
     let target = planes(case.tensor::<4>("in.target", device));

@@ -1,4 +1,4 @@
-//! Golden vectors: numbers of the authors' program, compared with ours under each file's own tolerance.
+//! Golden vectors: numbers of the reference implementation, compared with ours under each file's own tolerance.
 //!
 //! Every `*.safetensors` file in the folder named by `VENI_GOLDEN_DIR` (default: `tests/golden`) is one
 //! case. Which module computes it is read from the file's metadata, sizes from its tensors; a kind that

@@ -58,7 +58,7 @@ fn images(case: &Case) {
         }
     };
     let (prediction, target) = (case.data("in.pred_log"), case.data("in.gt_log"));
-    let [height, width, 3] = target.shape[..] else { panic!("in.gt_log is no image") };
+    let [height, width, 3] = target.shape[..] else { panic!("in.gt_log is not an image") };
     let radiance = |log: &[f64]| log.iter().map(|v| v.exp()).collect::<Vec<_>>();
     let gt = radiance(&wide(target));
     let aligned = radiance(&Alignment::LogFactor.apply(&prediction.values, &target.values, height));

@@ -1,4 +1,4 @@
-//! Learning-rate and loss-weight schedules. Their files name no module: told by their step inputs.
+//! Learning-rate and loss-weight schedules. Their files name no module: recognised by their step inputs.
 
 use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared};

@@ -43,7 +43,7 @@ fn exp(log: &[[f32; 3]]) -> Vec<[f32; 3]> {
 }
 
 fn grid(case: &Case, name: &str) -> Equirect {
-    let [height, width, 3] = case.data(name).shape[..] else { panic!("{name} is no image") };
+    let [height, width, 3] = case.data(name).shape[..] else { panic!("{name} is not an image") };
     Equirect::new(width, height)
 }
 
@@ -188,15 +188,15 @@ fn inverse(case: &Case, device: &Device) {
         let latent = latent.reshape([1, n, 3]).require_grad();
         let prediction = decoder.forward(latent.clone(), directions.clone());
         let log = Data::of(&prediction).values.as_chunks::<3>().0.to_vec();
-        let (loss, slope, exposure) = figure.evaluate(&log, *s as f32);
+        let (loss, by_output, exposure) = figure.evaluate(&log, *s as f32);
         losses.push(loss as f32);
         let [mse, cosine] = demo.display_terms(&log, *s as f32).expect("the demo's terms");
         let square = z.iter().map(|v| v * v).sum::<f64>() / z.len() as f64;
         terms.extend([mse, cosine, square].map(|v| v as f32));
 
-        let slope = Data::new([1, slope.len(), 3], slope.into_flattened());
-        let slope: Tensor<3> = slope.tensor([1, slope.values.len() / 3, 3], device);
-        let gradients = (prediction * slope).sum().backward();
+        let by_output = Data::new([1, by_output.len(), 3], by_output.into_flattened());
+        let by_output: Tensor<3> = by_output.tensor([1, by_output.values.len() / 3, 3], device);
+        let gradients = (prediction * by_output).sum().backward();
         let gradient = Data::of(&latent.grad(&gradients).expect("a gradient of the latent"));
         let mut gradient: Vec<f64> = gradient.values.iter().map(|v| f64::from(*v)).collect();
         gradient.push(exposure);

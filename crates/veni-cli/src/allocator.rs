@@ -1,4 +1,4 @@
-//! The allocator, and how it is told to keep the memory of a training.
+//! The allocator, and how it is made to keep the memory of a training.
 
 /// Training allocates and frees tensors all the time, which this allocator does faster than most systems' own.
 #[global_allocator]

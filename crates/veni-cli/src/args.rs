@@ -7,8 +7,8 @@ use clap::{Args, ValueEnum};
 /// Which model decodes (and encodes).
 #[derive(Args, Debug)]
 pub(crate) struct ModelArgs {
-    /// Model file (.safetensors, or a training run's folder), or the size of one inside this program: 27, 147 or 300
-    /// numbers [default: the one inside that a latent names, or 27]
+    /// Model file (.safetensors, or a training run's folder), or the latent dimension D of one inside this
+    /// program: 27, 147 or 300 [default: the one inside that a latent names, or 27]
     #[arg(long, short, value_name = "FILE|SIZE")]
     pub(crate) model: Option<PathBuf>,
 }

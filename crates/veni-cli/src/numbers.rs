@@ -1,6 +1,6 @@
 //! Numbers as they are typed, each with its range.
 
-/// Largest |exposure|. Light that is 2^64 brighter than a sky is no light, and close to what an f32 can hold.
+/// Largest |exposure|. Light that is 2^64 brighter than a sky is not light, and close to what an f32 can hold.
 const MAX_STOPS: f64 = 64.0;
 /// Largest width of a panorama of lights.
 const MAX_LIGHTS: usize = 4096;

@@ -20,9 +20,9 @@ pub(crate) const FRAME: &str = "veni:frame";
 /// Attribute of a cube map: its faces from top to bottom.
 pub(crate) const CUBE_FACES: &str = "veni:cubeFaces";
 
-/// Attribute of a shaded image and of its normals: the camera (`veni_fit::shade::Camera`).
+/// Attribute of a rendered image and of its normals: the camera (`veni_fit::shade::Camera`).
 pub(crate) const CAMERA: &str = "veni:camera";
-/// Attribute of a shaded image: what the surface is made of.
+/// Attribute of a rendered image: what the surface is made of.
 pub(crate) const MATERIAL: &str = "veni:material";
 
 /// Refuses, before any work, what could not be written after it: a file that exists, a name without one of
@@ -56,7 +56,7 @@ pub(crate) fn create_folder(folder: &Path) -> Result<()> {
 
 /// The file in `folder` that is called like `input`, with another extension.
 pub(crate) fn named(folder: &Path, input: &Path, extension: &str) -> Result<PathBuf> {
-    let Some(stem) = input.file_stem() else { bail!("{}: is no file name", input.display()) };
+    let Some(stem) = input.file_stem() else { bail!("{}: is not a file name", input.display()) };
     let mut name = stem.to_owned();
     name.push(".");
     name.push(extension);

@@ -1,4 +1,4 @@
-//! What the user is told, and where: results on stdout, notes and errors on stderr.
+//! What is reported to the user, and where: results on stdout, notes and errors on stderr.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -47,7 +47,7 @@ impl Report {
         }
     }
 
-    /// A remark that is no result (stderr, silenced by `--quiet`).
+    /// A remark that is not a result (stderr, silenced by `--quiet`).
     pub(crate) fn note(self, text: impl Display) {
         if !self.quiet {
             to_stderr(&format!("{text}\n"));

@@ -20,7 +20,9 @@ impl FromStr for Size {
     fn from_str(text: &str) -> Result<Self, String> {
         let side = |t: &str| {
             let n: usize = t.trim().parse().map_err(|_| {
-                format!("'{text}' is no size: give a width (2048) or width x height (2048x1024), in pixels")
+                format!(
+                    "'{text}' is not a size: give a width (2048) or width x height (2048x1024), in pixels"
+                )
             })?;
             match n {
                 0 => Err("a side of 0 pixels holds no image: give at least 1".to_owned()),

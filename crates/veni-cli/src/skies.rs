@@ -33,7 +33,7 @@ pub(crate) struct Target {
 /// How many skies, and what becomes of them.
 #[derive(Args, Debug)]
 pub(crate) struct Many {
-    /// So many random skies, of the seeds S, S + 1, ...
+    /// Number of random skies, of the seeds S, S + 1, ...
     #[arg(long, value_name = "COUNT", requires_all = ["seed", "out_dir"], value_parser = count)]
     count: Option<u64>,
 
@@ -55,7 +55,7 @@ pub(crate) struct Many {
 /// What is done to a sky before it is used.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Change {
-    /// Turn the sky about the vertical axis, counter-clockwise seen from above
+    /// Rotate the sky about the vertical axis (yaw), counter-clockwise seen from above
     #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = finite, allow_hyphen_values = true,
         hide_default_value = true)]
     pub(crate) turn: f64,
@@ -149,7 +149,7 @@ pub(crate) fn jobs(
 
 fn random(seed: u64, count: u64) -> Result<Vec<Sky>> {
     let Some(end) = seed.checked_add(count) else {
-        bail!("--count {count}: seeds end at {}; begin with a smaller one than {seed}", u64::MAX)
+        bail!("--count {count}: seeds end at {}; start with a smaller one than {seed}", u64::MAX)
     };
     Ok((seed..end).map(Sky::Seed).collect())
 }

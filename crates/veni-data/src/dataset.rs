@@ -12,9 +12,8 @@ use veni_image::Panorama;
 use veni_image::exposure::centre_exposure;
 use veni_light::sphere::Equirect;
 
-/// Hears how far reading and generating have come: panoramas that are there, and panoramas in all. Several threads
-/// tell it.
-pub type Heard<'a> = &'a (dyn Fn(usize, usize) + Sync);
+/// Progress of reading and generating: panoramas that are there, and panoramas in all. Reported from several threads.
+pub type ProgressCallback<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// One panorama, ready for use.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,15 +75,19 @@ impl Dataset {
     /// # Errors
     /// The first file (in order) that cannot be read, by name.
     pub fn load(files: &[PathBuf], grid: Equirect) -> Result<Self> {
-        Self::load_heard(files, grid, &|_, _| {})
+        Self::load_with_progress(files, grid, &|_, _| {})
     }
 
-    /// [`Dataset::load`], telling how far it has come.
+    /// [`Dataset::load`], reporting its progress.
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn load_heard(files: &[PathBuf], grid: Equirect, heard: Heard<'_>) -> Result<Self> {
-        Ok(Self::new(grid, load(files, grid, |_, item| Ok(item), heard)?))
+    pub fn load_with_progress(
+        files: &[PathBuf],
+        grid: Equirect,
+        progress: ProgressCallback<'_>,
+    ) -> Result<Self> {
+        Ok(Self::new(grid, load(files, grid, |_, item| Ok(item), progress)?))
     }
 
     /// Only the panoramas that are wanted.
@@ -127,12 +130,12 @@ pub(super) fn load(
     files: &[PathBuf],
     grid: Equirect,
     keep: impl Fn(usize, Item) -> Result<Item> + Sync,
-    heard: Heard<'_>,
+    progress: ProgressCallback<'_>,
 ) -> Result<Vec<Item>> {
     let done = AtomicUsize::new(0);
     parallel(files.len(), |at| {
         let item = keep(at, read_item(&files[at], grid)?)?;
-        heard(done.fetch_add(1, Ordering::Relaxed) + 1, files.len());
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, files.len());
         Ok(item)
     })
 }

@@ -19,7 +19,7 @@ pub struct Reconstruction {
 
 impl Reconstruction {
     /// Compares decoded images (log radiance at exposure 0, 3·W·H values each) with the panoramas they stand
-    /// for. The articles' protocol is [`Alignment::LogFactor`].
+    /// for. The papers' protocol is [`Alignment::LogFactor`].
     ///
     /// # Panics
     /// If there is not one image of the set's size per panorama.

@@ -14,7 +14,7 @@ use veni_light::sphere::Equirect;
 pub struct FitSettings {
     /// Objective, steps, rates.
     pub config: FitConfig,
-    /// The fit sees means over so many by so many pixels.
+    /// The fit sees means over squares of this many pixels a side.
     pub factor: usize,
 }
 
@@ -26,8 +26,8 @@ impl FitSettings {
         Self { config, factor: dividing(grid, if quick { 4 } else { 2 }) }
     }
 
-    /// The authors' helper: 2000 steps on every pixel, rates from `rates[0]` to `rates[1]`; `quick`: 300 steps on a
-    /// sixteenth of the pixels.
+    /// The reference implementation's helper: 2000 steps on every pixel, rates from `rates[0]` to `rates[1]`; `quick`:
+    /// 300 steps on a sixteenth of the pixels.
     pub fn reference(grid: Equirect, rates: [f64; 2], quick: bool) -> Self {
         let [first, last] = rates;
         let steps = if quick { 300 } else { 2000 };

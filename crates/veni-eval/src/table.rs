@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 pub enum Cell {
     /// A name.
     Text(String),
-    /// A number, shown with so many digits after the point; infinite and undefined ones are said in words.
+    /// A number, shown with this many digits after the point; infinite and undefined ones are said in words.
     Number(f64, usize),
     /// A number that spans orders of magnitude, shown with two significant digits.
     Scientific(f64),

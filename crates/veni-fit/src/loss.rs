@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::schedule::WeightSchedule;
 
-/// Mathematically right, or the authors' program.
+/// Mathematically right, or the reference implementation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LossForm {
     /// As described in the paper, with solid-angle weights at pixel centres.
     #[default]
     Corrected,
-    /// As in the authors' program.
+    /// As in the reference implementation.
     Reference,
 }
 
@@ -28,9 +28,9 @@ pub struct LossConfig {
     pub mage: WeightSchedule,
     /// Scale-invariant log error.
     pub scale_invariant: WeightSchedule,
-    /// Absolute level: squared mean log error per image. The corrected forms of the terms above and of the
-    /// cosine are all blind to a factor on the radiance; without this the decoder's level would be
-    /// arbitrary. Not in the paper, whose gradient and cosine terms fix the level by accident.
+    /// Exposure (log-mean) term: squared mean log error per image. The corrected forms of the terms above and of the
+    /// cosine are all blind to a factor on the radiance; without this the decoder's exposure would be
+    /// arbitrary. Not in the paper, whose gradient and cosine terms fix the exposure by accident.
     pub level: WeightSchedule,
     /// Colour direction.
     pub cosine: WeightSchedule,
@@ -45,7 +45,7 @@ pub struct LossConfig {
 }
 
 impl Default for LossConfig {
-    /// The paper's weights, and 1 for the level.
+    /// The paper's weights, and 1 for the exposure term.
     fn default() -> Self {
         let constant = WeightSchedule::Constant;
         Self {
@@ -64,7 +64,7 @@ impl Default for LossConfig {
 }
 
 impl LossConfig {
-    /// The authors' program: reference forms, the paper's weights, no separate level.
+    /// The reference implementation: reference forms, the paper's weights, no separate exposure term.
     pub fn reference() -> Self {
         Self { form: LossForm::Reference, level: WeightSchedule::Constant(0.0), ..Self::default() }
     }

@@ -105,11 +105,11 @@ fn rolling_by_whole_stripes_turns_the_latent() {
             let error = equivariance(&encoder, stripes * columns);
             assert!(error < 1e-5, "{name}, {stripes} stripes: {error}");
         }
-        assert!(equivariance(&encoder, 1) > 1e-4, "{name}: part of a stripe is no exact rotation");
+        assert!(equivariance(&encoder, 1) > 1e-4, "{name}: part of a stripe is not an exact rotation");
     }
 }
 
-/// The authors' sampling sees one meridian twice and does not wrap the seam; the check above must notice.
+/// The reference implementation's sampling sees one meridian twice and does not wrap the seam; the check above must notice.
 #[test]
 fn the_check_of_equivariance_can_fail() {
     let config = EncoderConfig { sampling: StripeSampling::Reference, ..small() };

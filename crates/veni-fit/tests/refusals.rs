@@ -93,7 +93,7 @@ fn images_that_do_not_fit_are_refused() {
     let encoder = Encoder::new(&model(small(), 5)).expect("a whole model");
     let grid = Equirect::new(16, 8);
     let message = encoder.encode(grid, &[&[0.0; 3]]).expect_err("too few values").to_string();
-    assert_eq!(message, "3 values are no panorama of 16 × 8 in RGB");
+    assert_eq!(message, "3 values are not a panorama of 16 × 8 in RGB");
     let (direction, image) = (vec![[0.0; 3]; 17], vec![[0.0; 3]; 16]);
     let forward = |directions: &[[f32; 3]], image: &[[f32; 3]]| {
         encoder.forward(directions, &[image]).expect_err("must be refused").to_string()

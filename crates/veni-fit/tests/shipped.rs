@@ -7,7 +7,7 @@ use veni_image::Panorama;
 use veni_light::sphere::Equirect;
 use veni_fit::Encoder;
 
-/// What burn's flex device gives for `mud_road_puresky.exr` and the model of 27 numbers.
+/// What burn's flex device gives for `mud_road_puresky.exr` and the model of latent dimension 27.
 #[allow(clippy::excessive_precision, reason = "as it was written")]
 const LATENT: [[f32; 3]; 9] = [
     [0.16630743, 0.77811354, 1.1437552],

@@ -143,7 +143,7 @@ fn overlaps(from: f64, to: f64) -> impl Iterator<Item = (f64, f64, f64)> {
 mod tests {
     use super::*;
 
-    /// Something with a sun, so that conservation is no accident of smoothness.
+    /// Something with a sun, so that conservation is not an accident of smoothness.
     fn sky(width: usize, height: usize) -> Panorama {
         Panorama::from_fn(Equirect::new(width, height), |[x, y, z]| {
             let sun = if 0.6 * x + 0.5 * y + 0.62 * z > 0.995 { 5e4 } else { 0.0 };

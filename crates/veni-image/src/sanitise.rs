@@ -50,8 +50,8 @@ pub fn sanitise_values(values: &mut [f32]) -> Result<Sanitised> {
     Ok(report)
 }
 
-/// The authors' loading of an image with `channels` ≥ 3 interleaved channels: [`sanitise_values`] over all of
-/// them (an alpha channel takes part in the extremes), then ln(v + [`LOG_FLOOR`]) of the first three.
+/// The reference implementation's loading of an image with `channels` ≥ 3 interleaved channels: [`sanitise_values`]
+/// over all of them (an alpha channel takes part in the extremes), then ln(v + [`LOG_FLOOR`]) of the first three.
 ///
 /// # Errors
 /// As [`sanitise_values`].

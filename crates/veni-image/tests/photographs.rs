@@ -44,7 +44,7 @@ fn jpeg_files_are_turned_upright() {
         assert!(off < 0.01 && wrong > 10.0 * off.max(0.005), "{held}: {off} upright, {wrong} upside down");
     }
     assert_eq!(read(&file("photo_exif6.jpg")).unwrap().grid(), Equirect::new(64, 96));
-    // a photograph is no panorama, whichever way it is held
+    // a photograph is not a panorama, whichever way it is held
     for name in ["photo_upright.jpg", "photo_exif6.jpg"] {
         let error = LdrPanorama::read(file(name)).unwrap_err().to_string();
         assert!(error.contains("64 × 96") && error.contains(name), "{error}");

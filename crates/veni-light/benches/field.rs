@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use veni_light::field::Curved;
+use veni_light::field::LocalQuadratic;
 use veni_light::latent::{Latent, Prior};
 use veni_light::model::{Model, ModelConfig};
 use veni_light::sphere::Equirect;
@@ -33,9 +33,9 @@ fn field(c: &mut Criterion) {
         group.bench_function("gradient 128x64", |b| {
             b.iter_with_large_drop(|| black_box(&field).gradient(&directions, square));
         });
-        let curved = |_, p: [f32; 3]| Curved { loss: 0.0, slope: p, curvature: [1.0; 3] };
+        let quadratic = |_, p: [f32; 3]| LocalQuadratic { loss: 0.0, gradient: p, weight: [1.0; 3] };
         group.bench_function("normal equations 128x64", |b| {
-            b.iter_with_large_drop(|| black_box(&field).normal_equations(&directions, curved));
+            b.iter_with_large_drop(|| black_box(&field).normal_equations(&directions, quadratic));
         });
         group.finish();
     }

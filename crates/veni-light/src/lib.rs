@@ -11,6 +11,30 @@
 //! | [`cholesky`] | small dense systems of equations |
 //! | [`digest`] | content as one short name |
 //! | [`output`] | files that are written beside their target and renamed |
+//!
+//! # Glossary
+//!
+//! | term | meaning | symbol, unit |
+//! |---|---|---|
+//! | latent | the code of a panorama: N vectors in R³ that rotate with the scene, and a log exposure | Z ∈ R^{N×3} |
+//! | latent dimension | number of coordinates of the vectors; names a model (`--model 27`) | D = 3N |
+//! | conditioning | what the decoder is given of the latent besides its products with the direction: rotation invariants of its vectors (condition features) | a |
+//! | field | the decoder conditioned on one latent: direction to radiance | f(d; Z) |
+//! | radiance | light per projected area and solid angle along a direction; linear Rec. 709 R, G, B, up to a factor | L, W m⁻² sr⁻¹; generated scenes: kcd/m² |
+//! | exposure | factor between the decoder's output and radiance; a panorama's is the solid-angle-weighted mean of ln luminance | s, natural log |
+//! | irradiance | radiance times cosine, integrated over the hemisphere above a surface | E, W m⁻² |
+//! | solid angle | a pixel's part of the unit sphere, the weight in means over a panorama | ω, sr; 4π in all |
+//! | equirectangular | image of the sphere with azimuth along the columns and polar angle along the rows, twice as wide as high | W × H = 2H × H |
+//! | native frame | right-handed axes with z up, the middle of a panorama at +x ([`sphere`]) | d = (x, y, z) |
+//! | yaw | rotation about z, counter-clockwise seen from above; the group SO(2) | α, rad |
+//! | prior | Gaussian density of latents before anything is seen, invariant to yaw: random skies, a fit's penalty | p(Z) |
+//! | posterior | density of latents given a panorama: the encoder's mean and variance | q(Z given I) = N(μ, σ²) |
+//! | encoder, decoder | networks from a panorama to the posterior, and from latent and direction to log radiance | |
+//! | stripe | vertical strip of a panorama, all heights at a few meridians; one token of the encoder ([`sphere::Stripes`]) | T stripes of P samples |
+//! | fold | to compute once per latent what does not depend on the direction; the result is the field. (Elsewhere: a part of a cross-validation) | |
+//! | Vector Neuron | layer on lists of 3-vectors that commutes with rotations: linear maps mix vectors, never coordinates | VN |
+//! | SO(2) layer | layer that commutes with yaw: x and y as a Vector Neuron's, z as an invariant number | |
+//! | Gauss–Newton weight | non-negative number in place of a loss's second derivative with respect to log radiance | ℓ″, [`field::LocalQuadratic`] |
 
 #![cfg_attr(not(feature = "training"), forbid(unsafe_code))]
 

@@ -79,7 +79,7 @@ fn beside(path: &Path) -> Result<PathBuf> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let name = path
         .file_name()
-        .ok_or_else(|| Error::invalid(format!("{}: is no file name to write to", path.display())))?;
+        .ok_or_else(|| Error::invalid(format!("{}: is not a file name to write to", path.display())))?;
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(name);
     hidden.push(format!(".{:016x}-{}.part", process_token(), COUNT.fetch_add(1, Ordering::Relaxed)));

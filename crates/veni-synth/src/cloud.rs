@@ -1,18 +1,18 @@
-//! Decks of cloud: fractal density on a spherical shell above the viewer, lit by sun, sky and ground. MODEL (67).
+//! Cloud layers: fractal density on a spherical shell above the viewer, lit by sun, sky and ground. MODEL (67).
 //!
-//! A **heap** (cumulus, stratocumulus) has a flat base and tops that rise where the cloud is dense; rays march through
-//! it and towards the sun. A **sheet** (cirrus, altocumulus, altostratus, stratus) is thin enough to be a surface of
+//! **Cumulus** (and stratocumulus) has a flat base and tops that rise where the cloud is dense; rays march through
+//! it and towards the sun. **Stratus** (and cirrus, altocumulus, altostratus) is thin enough to be a surface of
 //! optical depth. Within cloud, light scattered many times is taken from the two-stream solution, 1 / (1 + ¾ (1 − g) τ)
 //! with g = 0.85 (Bohren, Am. J. Phys. 1987), light scattered once from Henyey–Greenstein lobes. The brightness of a
-//! closed sheet over elevation γ follows Moon & Spencer (1942), (1 + 2 sin γ).
+//! closed stratus layer over elevation γ follows Moon & Spencer (1942), (1 + 2 sin γ).
 
-mod sheet;
+mod stratus;
 
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::deck::{Deck, DeckKind};
+use super::cloud_layer::{CloudKind, CloudLayer};
 use super::dome::henyey_greenstein;
 use super::noise::{billows3, fractal2};
 
@@ -20,33 +20,33 @@ use super::noise::{billows3, fractal2};
 const EARTH: f32 = 6360.0;
 /// ¾ (1 − g).
 const DIFFUSION: f32 = 0.11;
-/// Samples of a ray inside a heap.
+/// Samples of a ray inside cumulus.
 const STEPS: usize = 10;
 
-/// What lights a deck.
+/// What lights a layer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lighting {
     /// Towards the sun or moon.
     pub(super) source: Vec3,
-    /// Irradiance of the source on a surface facing it, at the deck.
+    /// Irradiance of the source on a surface facing it, at the layer.
     pub(super) direct: Vec3,
-    /// Mean radiance of the sky above the deck.
+    /// Mean radiance of the sky above the layer.
     pub(super) sky: Vec3,
-    /// Radiance that the ground sends up.
+    /// Radiance that the ground reflects upwards.
     pub(super) ground: Vec3,
 }
 
-/// A deck, ready to be looked at.
+/// A layer, ready to be looked at.
 #[derive(Clone, Debug)]
 pub(super) struct Cloud {
-    deck: Deck,
+    layer: CloudLayer,
     axis: Vec2,
     offset: Vec2,
     threshold: f32,
     pub(super) lighting: Vec<Lighting>,
 }
 
-/// What a ray gathers in a deck.
+/// What a ray gathers in a layer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gathered {
     /// Radiance of the cloud itself.
@@ -58,10 +58,10 @@ pub(super) struct Gathered {
 }
 
 impl Cloud {
-    pub(super) fn new(deck: &Deck) -> Self {
-        let axis = Vec2::from_angle(deck.wind);
+    pub(super) fn new(layer: &CloudLayer) -> Self {
+        let axis = Vec2::from_angle(layer.wind);
         let mut this = Self {
-            deck: deck.clone(),
+            layer: layer.clone(),
             axis,
             // far from the origin of the noise, where every seed looks alike
             offset: Vec2::new(37.7, -91.3),
@@ -71,27 +71,27 @@ impl Cloud {
         // so that `cover` is what it says, whatever the distribution of the noise
         let mut samples: Vec<f32> = (0..400)
             .map(|k| {
-                let p = Vec2::new((k % 20) as f32, (k / 20) as f32) * 1.37 * deck.scale;
+                let p = Vec2::new((k % 20) as f32, (k / 20) as f32) * 1.37 * layer.scale;
                 this.field(p, 0.0)
             })
             .collect();
         samples.sort_unstable_by(f32::total_cmp);
-        let at = ((1.0 - deck.cover).clamp(0.0, 1.0) * 399.0) as usize;
-        this.threshold = if deck.cover >= 0.999 { samples[0] - 1.0 } else { samples[at] };
+        let at = ((1.0 - layer.cover).clamp(0.0, 1.0) * 399.0) as usize;
+        this.threshold = if layer.cover >= 0.999 { samples[0] - 1.0 } else { samples[at] };
         this
     }
 
-    pub(super) fn deck(&self) -> &Deck {
-        &self.deck
+    pub(super) fn layer(&self) -> &CloudLayer {
+        &self.layer
     }
 
     /// The noise that says where there is cloud; `p` and `footprint` in km.
     fn field(&self, p: Vec2, footprint: f32) -> f32 {
-        let d = &self.deck;
+        let d = &self.layer;
         let along = p.dot(self.axis) / d.stretch;
         let q = Vec2::new(along, p.perp_dot(self.axis)) / d.scale + self.offset;
         let footprint = footprint / d.scale;
-        let octaves = if d.kind == DeckKind::Heap { 3 } else { 6 };
+        let octaves = if d.kind == CloudKind::Cumulus { 3 } else { 6 };
         let mut v = if d.stretch > 1.5 {
             // fibres bend
             let bend = fractal2(q * 0.6, 2, 0.5, footprint * 0.6, d.seed ^ 0x51);
@@ -106,13 +106,13 @@ impl Cloud {
         v
     }
 
-    /// Density in a heap, 0 to 1, at `p` (km) and `level` (0 at the base, 1 at the highest tops), and the level of
+    /// Density in cumulus, 0 to 1, at `p` (km) and `level` (0 at the base, 1 at the highest tops), and the level of
     /// the top there.
     fn density(&self, p: Vec2, level: f32, footprint: f32, fine: bool) -> (f32, f32) {
         if !(0.0..1.0).contains(&level) {
             return (0.0, 0.0);
         }
-        let d = &self.deck;
+        let d = &self.layer;
         let rise = 3.0 * (self.field(p, footprint) - self.threshold);
         let inside = rise - 0.9 * level * level.sqrt();
         let most = 0.9 * d.ragged;
@@ -138,9 +138,9 @@ impl Cloud {
     /// Looks along a unit direction above the horizon. `footprint` is the angle that a sample stands for, `jitter`
     /// in 0..1 shifts the samples along the ray.
     pub(super) fn gather(&self, direction: Vec3, footprint: f32, jitter: f32) -> Option<Gathered> {
-        match self.deck.kind {
-            DeckKind::Heap => self.gather_heap(direction, footprint, jitter),
-            DeckKind::Sheet => self.gather_sheet(direction, footprint),
+        match self.layer.kind {
+            CloudKind::Cumulus => self.gather_cumulus(direction, footprint, jitter),
+            CloudKind::Stratus => self.gather_stratus(direction, footprint),
         }
     }
 
@@ -149,8 +149,8 @@ impl Cloud {
         self.gather(direction, 0.0, 0.5).map_or(1.0, |g| g.transmittance)
     }
 
-    fn gather_heap(&self, direction: Vec3, footprint: f32, jitter: f32) -> Option<Gathered> {
-        let d = &self.deck;
+    fn gather_cumulus(&self, direction: Vec3, footprint: f32, jitter: f32) -> Option<Gathered> {
+        let d = &self.layer;
         let up = direction.z.max(0.0);
         let (near, far) = (Self::reach(d.base, up), Self::reach(d.base + d.thickness, up));
         let length = (far - near) / STEPS as f32;
@@ -180,9 +180,9 @@ impl Cloud {
         (opaque > 1e-4).then(|| Gathered { radiance, transmittance: through, distance: distance / opaque })
     }
 
-    /// Source function inside a heap.
+    /// Source function inside cumulus.
     fn lit(&self, direction: Vec3, p: Vec2, [level, top]: [f32; 2], density: f32) -> Vec3 {
-        let d = &self.deck;
+        let d = &self.layer;
         let sigma = d.depth / d.thickness;
         let mut light = Vec3::ZERO;
         for l in &self.lighting {
@@ -216,8 +216,8 @@ impl Cloud {
 mod tests {
     use super::*;
 
-    fn deck(kind: DeckKind, cover: f32) -> Deck {
-        Deck {
+    fn layer(kind: CloudKind, cover: f32) -> CloudLayer {
+        CloudLayer {
             kind,
             base: 1.2,
             thickness: 0.8,
@@ -232,14 +232,14 @@ mod tests {
         }
     }
 
-    /// Share of a deck of this seed whose noise is above the threshold, over 20 × 20 of its features; and share of it
+    /// Share of a layer of this seed whose noise is above the threshold, over 20 × 20 of its features; and share of it
     /// that has cloud at any height.
-    fn share(kind: DeckKind, cover: f32, seed: u32) -> [f32; 2] {
+    fn share(kind: CloudKind, cover: f32, seed: u32) -> [f32; 2] {
         const SIDE: usize = 60;
-        let cloud = Cloud::new(&Deck { seed, ..deck(kind, cover) });
+        let cloud = Cloud::new(&CloudLayer { seed, ..layer(kind, cover) });
         let (mut above, mut cloudy) = (0, 0);
         for k in 0..SIDE * SIDE {
-            let p = Vec2::new((k % SIDE) as f32, (k / SIDE) as f32) * (20.0 / SIDE as f32 * cloud.deck.scale);
+            let p = Vec2::new((k % SIDE) as f32, (k / SIDE) as f32) * (20.0 / SIDE as f32 * cloud.layer.scale);
             above += usize::from(cloud.field(p, 0.0) > cloud.threshold);
             cloudy +=
                 usize::from((1..8).any(|level| cloud.density(p, level as f32 / 8.0, 0.0, true).0 > 0.0));
@@ -248,9 +248,9 @@ mod tests {
     }
 
     #[test]
-    fn cover_is_the_share_of_the_deck_that_is_cloud() {
+    fn cover_is_the_share_of_the_layer_that_is_cloud() {
         let seeds = 16;
-        for kind in [DeckKind::Sheet, DeckKind::Heap] {
+        for kind in [CloudKind::Stratus, CloudKind::Cumulus] {
             for cover in [0.0, 0.1, 0.3, 0.6, 0.9, 1.0] {
                 let all: Vec<_> = (0..seeds).map(|seed| share(kind, cover, seed)).collect();
                 let mean = |k: usize| all.iter().map(|s| s[k]).sum::<f32>() / seeds as f32;
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn thick_cloud_hides_the_sun_and_is_as_bright_as_snow_at_most() {
-        let mut cloud = Cloud::new(&deck(DeckKind::Heap, 1.0));
+        let mut cloud = Cloud::new(&layer(CloudKind::Cumulus, 1.0));
         cloud.lighting = vec![Lighting {
             source: Vec3::new(0.6, 0.0, 0.8),
             direct: Vec3::splat(100.0),

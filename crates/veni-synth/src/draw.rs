@@ -17,10 +17,10 @@ use land::{ground, ridges};
 
 use crate::{Error, Result};
 
-/// What is given rather than drawn.
+/// Overrides: what is given rather than drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Fixed {
+pub struct Overrides {
     /// Weather or time of day.
     pub sky: Option<SkyKind>,
     /// What stands around the viewer.
@@ -37,7 +37,7 @@ pub struct Fixed {
     pub ground_albedo: Option<f32>,
 }
 
-impl Fixed {
+impl Overrides {
     /// Checks every number.
     ///
     /// # Errors
@@ -61,9 +61,9 @@ impl Fixed {
 }
 
 impl Scene {
-    /// Scene `index` of the set with this seed. Scenes of a set do not depend on each other, and what is not `fixed`
+    /// Scene `index` of the set with this seed. Scenes of a set do not depend on each other, and what is not overridden
     /// does not depend on what is, except where it must (the colour of dusk on the height of the sun).
-    pub fn draw(seed: u64, index: u64, fixed: &Fixed) -> Self {
+    pub fn draw(seed: u64, index: u64, overrides: &Overrides) -> Self {
         let mut draw = Draw::new(seed, index, Part::Scene);
         let draw = &mut draw;
         let sky = draw.weighted(&[
@@ -73,7 +73,7 @@ impl Scene {
             (0.25, SkyKind::Sunset),
             (0.10, SkyKind::Night),
         ]);
-        let sky = fixed.sky.unwrap_or(sky);
+        let sky = overrides.sky.unwrap_or(sky);
         let place = draw.weighted(&[
             (0.21, Place::PureSky),
             (0.12, Place::Plain),
@@ -89,20 +89,20 @@ impl Scene {
             (0.03, Place::Rocks),
             (0.03, Place::Shelter),
         ]);
-        let place = fixed.place.unwrap_or(place);
+        let place = overrides.place.unwrap_or(place);
         let elevation = elevation(draw, sky);
-        let sun_elevation = fixed.sun_elevation.unwrap_or(elevation);
+        let sun_elevation = overrides.sun_elevation.unwrap_or(elevation);
         let azimuth = draw.azimuth().to_degrees();
         let haze = draw.normal(0.0, 0.4).exp();
         let turbidity = (if sky == SkyKind::Overcast { 4.0 } else { 2.45 } * haze).clamp(1.7, 9.0);
-        let clouds = clouds(draw, sky, fixed.cloud_cover);
+        let clouds = clouds(draw, sky, overrides.cloud_cover);
         let moon = moon(draw, sun_elevation);
         let settled =
             matches!(place, Place::Street | Place::Square | Place::Courtyard | Place::Village | Place::Park);
         let glow = draw.log_range(5e-7, 2e-4) * if settled { 3.0 } else { 0.5 };
         let warm = draw.range(0.0, 1.0);
         let mut ground = ground(draw, place);
-        if let Some(albedo) = fixed.ground_albedo {
+        if let Some(albedo) = overrides.ground_albedo {
             ground.tone = 1.0;
             ground.tone = albedo / veni_image::luminance(ground.albedo()).max(1e-4);
         }
@@ -116,8 +116,8 @@ impl Scene {
             index,
             sky,
             sun_elevation,
-            sun_azimuth: fixed.sun_azimuth.unwrap_or(azimuth),
-            turbidity: fixed.turbidity.unwrap_or(turbidity),
+            sun_azimuth: overrides.sun_azimuth.unwrap_or(azimuth),
+            turbidity: overrides.turbidity.unwrap_or(turbidity),
             ozone: draw.range(240.0, 420.0),
             moon,
             clouds,
@@ -130,7 +130,7 @@ impl Scene {
             lit: sun_elevation < 0.5 && (settled || draw.chance(0.3)),
             white,
         };
-        if fixed.sun_azimuth.is_none() && sun_elevation > -0.3 {
+        if overrides.sun_azimuth.is_none() && sun_elevation > -0.3 {
             scene.seek_sun();
         }
         scene

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::draw::Fixed;
+use super::draw::Overrides;
 use super::render::render;
 use super::scene::Scene;
 use veni_image::Panorama;
@@ -18,13 +18,13 @@ use veni_light::sphere::Equirect;
 pub fn generate<E: Send>(
     seed: u64,
     indices: Range<u64>,
-    fixed: &Fixed,
+    overrides: &Overrides,
     grid: Equirect,
     wanted: impl Fn(&Scene) -> bool + Sync,
     take: impl Fn(Scene, Panorama) -> Result<(), E> + Sync,
 ) -> Result<(), E> {
     indices.into_par_iter().try_for_each(|index| {
-        let scene = Scene::draw(seed, index, fixed);
+        let scene = Scene::draw(seed, index, overrides);
         if !wanted(&scene) {
             return Ok(());
         }

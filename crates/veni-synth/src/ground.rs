@@ -121,7 +121,7 @@ impl Ground {
         (0.5 * (0.003 + 0.005_12 * self.wind)).sqrt()
     }
 
-    /// How much of the light from a source rough ground sends back, relative to a flat Lambert surface: its grains and
+    /// How much of the light from a source rough ground reflects, relative to a flat Lambert surface: its grains and
     /// blades show their shaded sides against the light, and hide their shadows in it. Directions point away.
     pub(super) fn facing(&self, to_eye: Vec3, to_source: Vec3) -> f32 {
         let low = (1.0 - to_source.z * to_source.z).max(0.0).sqrt();

@@ -9,9 +9,9 @@ mod tests;
 
 use glam::{Vec2, Vec3};
 
+use super::material::Material;
 use super::random::{Draw, Part};
 use super::scene::{Place, Scene};
-use super::skin::Skin;
 use super::solid::{Shape, Solid};
 
 /// Leaves overhead, as a layer with holes.
@@ -157,9 +157,9 @@ impl Builder {
         Vec2::from_angle(self.draw.azimuth()) * r
     }
 
-    fn add(&mut self, shape: Shape, skin: Skin) {
+    fn add(&mut self, shape: Shape, material: Material) {
         let seed = self.draw.bits();
-        self.layout.solids.push(Solid { shape, skin, seed });
+        self.layout.solids.push(Solid { shape, material, seed });
     }
 }
 

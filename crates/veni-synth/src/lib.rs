@@ -8,7 +8,7 @@
 //! |---|---|
 //! | clear sky, sunlight, dusk | single scattering in eight bands of wavelength through molecules, aerosol and ozone of a spherical earth, light scattered more often in closed form ([`Scene::turbidity`], [`Scene::ozone`]) |
 //! | sun and moon | limb-darkened discs of true solid angle and radiance, integrated over pixels |
-//! | clouds | [`Deck`]s of fractal density, ray-marched or as sheets, lit by sun, sky and ground |
+//! | clouds | [`CloudLayer`]s of fractal density, ray-marched (cumulus) or thin (stratus), lit by sun, sky and ground |
 //! | hills, mountains, woods, towns | [`Ridge`]s, behind air |
 //! | trees, houses, rocks, walls, cars, lamps | solids around the viewer with shadows, by [`Place`] |
 //! | ground | [`Surface`]s in a [`Pattern`]; water with waves, Fresnel reflection and glitter |
@@ -16,10 +16,10 @@
 //!
 //! ```
 //! use veni_light::sphere::Equirect;
-//! use veni_synth::{Fixed, Scene, SkyKind, render};
+//! use veni_synth::{Overrides, Scene, SkyKind, render};
 //!
-//! let fixed = Fixed { sky: Some(SkyKind::Clear), sun_elevation: Some(30.0), ..Fixed::default() };
-//! let scene = Scene::draw(7, 0, &fixed);
+//! let overrides = Overrides { sky: Some(SkyKind::Clear), sun_elevation: Some(30.0), ..Overrides::default() };
+//! let scene = Scene::draw(7, 0, &overrides);
 //! let panorama = render(&scene, Equirect::new(32, 16));
 //! assert_eq!(panorama, render(&scene, Equirect::new(32, 16)));
 //! ```
@@ -29,18 +29,18 @@
 mod ambient;
 mod atmosphere;
 mod cloud;
-mod deck;
+mod cloud_layer;
 mod disc;
 mod dome;
 mod draw;
 mod generate;
 mod ground;
 mod layout;
+mod material;
 mod noise;
 mod random;
 mod render;
 mod scene;
-mod skin;
 mod sky;
 mod solid;
 mod spectrum;
@@ -54,8 +54,8 @@ mod tests;
 
 pub use veni_light::{Error, Result};
 
-pub use deck::{Deck, DeckKind};
-pub use draw::Fixed;
+pub use cloud_layer::{CloudKind, CloudLayer};
+pub use draw::Overrides;
 pub use generate::generate;
 pub use render::render;
 pub use scene::{Moon, Place, Ridge, RidgeKind, Scene, SkyKind};

@@ -4,7 +4,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::deck::Deck;
+use super::cloud_layer::CloudLayer;
 use super::surface::{Ground, Surface};
 
 /// All parameters of a scene; [`super::render`] is a function of these alone.
@@ -27,8 +27,8 @@ pub struct Scene {
     pub ozone: f32,
     /// The moon, on some nights.
     pub moon: Option<Moon>,
-    /// Decks of cloud.
-    pub clouds: Vec<Deck>,
+    /// Cloud layers.
+    pub clouds: Vec<CloudLayer>,
     /// Radiance of the lights of towns at the horizon, kcd/m².
     pub glow: [f32; 3],
     /// Where the viewer stands.
@@ -53,9 +53,9 @@ pub struct Scene {
 pub enum SkyKind {
     /// No cloud, or hardly any.
     Clear,
-    /// Heaps, sheets or both, with gaps.
+    /// Cumulus, stratus or both, with gaps.
     Cloudy,
-    /// A closed sheet.
+    /// Closed stratus.
     Overcast,
     /// The sun within some degrees of the horizon.
     Sunset,

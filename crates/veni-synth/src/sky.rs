@@ -1,4 +1,4 @@
-//! The whole sky of a scene: clear domes, night, decks of cloud, and the air in front of distant things.
+//! The whole sky of a scene: clear domes, night, cloud layers, and the air in front of distant things.
 
 use std::f32::consts::PI;
 
@@ -35,9 +35,9 @@ pub(super) struct Sky {
     glow: Vec3,
     /// Extinction at sea level, per km: molecules and aerosol.
     extinction: [Vec3; 2],
-    /// Mean radiance of the decks, which lights the air below them.
+    /// Mean radiance of the layers, which lights the air below them.
     below: Vec3,
-    /// Share of the light from above that decks keep from the air below them.
+    /// Share of the light from above that layers keep from the air below them.
     shade: f32,
 }
 
@@ -72,15 +72,15 @@ impl Sky {
         let mean = this.mean_clear();
         let direct: Vec3 = this.sources.iter().map(|s| s.clear * s.direction.z.max(0.0)).sum();
         let ground = Vec3::from(scene.ground.albedo()) * (direct + PI * mean) / PI;
-        let mut decks = scene.clouds.clone();
-        decks.sort_by(|a, b| a.base.total_cmp(&b.base));
+        let mut layers = scene.clouds.clone();
+        layers.sort_by(|a, b| a.base.total_cmp(&b.base));
         // from the highest down: each one shades those below
         let (mut direct_left, mut clouds) = (1.0, Vec::new());
-        for deck in decks.iter().rev() {
-            let mut cloud = Cloud::new(deck);
+        for layer in layers.iter().rev() {
+            let mut cloud = Cloud::new(layer);
             let lighting = |s: &Source| {
                 let up = f64::from(s.direction.z);
-                let there = air.to_sun(f64::from(deck.base + 0.5 * deck.thickness), up);
+                let there = air.to_sun(f64::from(layer.base + 0.5 * layer.thickness), up);
                 let direct = to_rgb(&std::array::from_fn(|k| there[k] * s.spectrum[k])) * direct_left;
                 Lighting { source: s.direction, direct, sky: Vec3::ZERO, ground: Vec3::ZERO }
             };
@@ -92,7 +92,7 @@ impl Sky {
                 ground: ground * direct_left + 0.8 * this.glow,
             };
             cloud.lighting.push(fill);
-            let kept = deck.cover.min(1.0) * (1.0 - 1.0 / (1.0 + 0.11 * deck.depth));
+            let kept = layer.cover.min(1.0) * (1.0 - 1.0 / (1.0 + 0.11 * layer.depth));
             direct_left *= 1.0 - kept;
             clouds.insert(0, cloud);
         }
@@ -117,7 +117,7 @@ impl Sky {
                 break;
             }
             if let Some(g) = cloud.gather(direction, footprint, jitter) {
-                let height = cloud.deck().base;
+                let height = cloud.layer().base;
                 let air = self.air_transmittance(g.distance, height);
                 // the cloud through the air before it; where it is opaque, that air hides no sky
                 radiance += through
@@ -128,7 +128,7 @@ impl Sky {
         radiance + through * clear
     }
 
-    /// The share of light from a direction that gets through all decks.
+    /// The share of light from a direction that gets through all layers.
     pub(super) fn transmittance(&self, direction: Vec3) -> f32 {
         self.clouds.iter().map(|c| c.transmittance(direction)).product()
     }

@@ -7,14 +7,14 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{Vec2, Vec3};
 
+use super::material::Material;
 use super::noise::fractal3;
-use super::skin::Skin;
 
-/// A solid and its skin.
+/// A solid and its material.
 #[derive(Clone, Debug)]
 pub(super) struct Solid {
     pub(super) shape: Shape,
-    pub(super) skin: Skin,
+    pub(super) material: Material,
     pub(super) seed: u32,
 }
 
@@ -149,7 +149,7 @@ impl Solid {
         if far.0 <= 1e-3 || near.0 >= reach {
             return None;
         }
-        let Skin::Leaves { open, size, .. } = self.skin else {
+        let Material::Leaves { open, size, .. } = self.material else {
             return (near.0 > 1e-3).then_some(near);
         };
         // leaves: solid where the noise says so, at the near and at the far side
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn rays_meet_shapes_where_they_are() {
-        let plain = Skin::Plain { albedo: Vec3::ONE, mottle: 0.0, size: 1.0 };
+        let plain = Material::Plain { albedo: Vec3::ONE, mottle: 0.0, size: 1.0 };
         let at = Vec2::new(10.0, 0.0);
         let shapes = [
             Shape::block(at, Vec2::Y, Vec2::new(3.0, 2.0), [0.0, 5.0, 0.0]),
@@ -263,7 +263,7 @@ mod tests {
         for shape in shapes {
             let text = format!("{shape:?}");
             let sun = Vec3::new(0.6, 0.0, 0.8);
-            let solids = Solids::new(vec![Solid { shape, skin: plain, seed: 0 }], &[sun]);
+            let solids = Solids::new(vec![Solid { shape, material: plain, seed: 0 }], &[sun]);
             let hit = solids.first(Vec3::Z, Vec3::X, 1e4).unwrap_or_else(|| panic!("missed {text}"));
             assert!((hit.distance - 8.0).abs() < 1e-3, "{text}: {hit:?}");
             assert!(hit.normal.x < -0.6 && (hit.normal.length() - 1.0).abs() < 1e-3, "{text}: {hit:?}");

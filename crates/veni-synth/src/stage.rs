@@ -8,9 +8,9 @@ use glam::{Vec2, Vec3};
 
 use super::ambient::Ambient;
 use super::layout::{Lamp, layout};
+use super::material::Material;
 use super::noise::fractal2;
 use super::scene::Scene;
-use super::skin::Skin;
 use super::sky::{Sky, spiral};
 use super::solid::Hit;
 use super::spectrum::luminance;
@@ -78,7 +78,7 @@ impl<'a> Stage<'a> {
                     Thing::Leaves(_) => wall(0.12) + 0.05 * *radiance,
                     Thing::Slope(_) => *radiance * 0.3,
                     Thing::Solid(h) => {
-                        wall(if matches!(self.view.solids.all[h.solid].skin, Skin::Leaves { .. }) {
+                        wall(if matches!(self.view.solids.all[h.solid].material, Material::Leaves { .. }) {
                             0.1
                         } else {
                             0.28
@@ -176,9 +176,9 @@ impl<'a> Stage<'a> {
         let solid = &self.view.solids.all[hit.solid];
         let normal = if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal };
         let (albedo, shine, mirror) =
-            solid.skin.paint(point, hit.normal, footprint * hit.distance, solid.seed);
+            solid.material.paint(point, hit.normal, footprint * hit.distance, solid.seed);
         let (front, back) = self.irradiance(point, normal, |_| 1.0);
-        let mut out = if let Skin::Leaves { .. } = solid.skin {
+        let mut out = if let Material::Leaves { .. } = solid.material {
             // leaves face all ways, let light through, and shade each other more the deeper they sit
             let deep =
                 if hit.normal.dot(direction) > 0.0 { 0.5 } else { 0.55 + 0.3 * hit.normal.z.max(-0.6) };

@@ -8,16 +8,16 @@ const SMALL: Equirect = Equirect { width: 32, height: 16 };
 
 /// A clear noon on a plain with nothing on it.
 fn clear(elevation: f32) -> Scene {
-    let fixed = Fixed {
+    let overrides = Overrides {
         sky: Some(SkyKind::Clear),
         place: Some(Place::Plain),
         sun_elevation: Some(elevation),
         sun_azimuth: Some(40.0),
         turbidity: Some(2.5),
         cloud_cover: Some(0.0),
-        ..Fixed::default()
+        ..Overrides::default()
     };
-    Scene { ridges: Vec::new(), fullness: 0.0, white: [1.0; 3], ..Scene::draw(3, 1, &fixed) }
+    Scene { ridges: Vec::new(), fullness: 0.0, white: [1.0; 3], ..Scene::draw(3, 1, &overrides) }
 }
 
 /// ∫ Y max(⟨n, d⟩, 0) dω, in klx.
@@ -33,15 +33,15 @@ fn illuminance(panorama: &Panorama, normal: [f32; 3]) -> f64 {
 
 #[test]
 fn a_scene_is_a_function_of_seed_and_index_whatever_the_threads() {
-    let fixed = Fixed::default();
+    let overrides = Overrides::default();
     let in_pool = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| render(&Scene::draw(5, 11, &fixed), SMALL))
+        pool.install(|| render(&Scene::draw(5, 11, &overrides), SMALL))
     };
     let first = in_pool(1);
     assert_eq!(first, in_pool(3));
     for (seed, index) in [(5, 12), (6, 11)] {
-        assert_ne!(first, render(&Scene::draw(seed, index, &fixed), SMALL));
+        assert_ne!(first, render(&Scene::draw(seed, index, &overrides), SMALL));
     }
     for place in Place::ALL {
         assert_eq!(serde_json::to_value(place).unwrap(), place.name());
@@ -50,12 +50,12 @@ fn a_scene_is_a_function_of_seed_and_index_whatever_the_threads() {
         assert_eq!(serde_json::to_value(sky).unwrap(), sky.name());
     }
     // and the parameters say it all
-    let scene = Scene::draw(5, 11, &fixed);
+    let scene = Scene::draw(5, 11, &overrides);
     let text = serde_json::to_string(&scene).unwrap();
     assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), scene);
     // what is fixed is kept, and the rest stays as it was
-    let fixed = Fixed { sun_azimuth: Some(12.0), turbidity: Some(4.0), ..fixed };
-    let turned = Scene::draw(5, 11, &fixed);
+    let overrides = Overrides { sun_azimuth: Some(12.0), turbidity: Some(4.0), ..overrides };
+    let turned = Scene::draw(5, 11, &overrides);
     assert_eq!((turned.sun_azimuth, turned.turbidity), (12.0, 4.0));
     assert_eq!(turned, Scene { sun_azimuth: 12.0, turbidity: 4.0, ..scene });
 }
@@ -65,14 +65,14 @@ fn every_kind_of_scene_is_positive_and_finite() {
     let count = Place::ALL.len() * SkyKind::ALL.len();
     let mut ranges = Vec::new();
     for k in 0..count {
-        let fixed = Fixed {
+        let overrides = Overrides {
             sky: Some(SkyKind::ALL[k % SkyKind::ALL.len()]),
             place: Some(Place::ALL[k / SkyKind::ALL.len()]),
-            ..Fixed::default()
+            ..Overrides::default()
         };
-        let panorama = render(&Scene::draw(1, k as u64, &fixed), SMALL);
+        let panorama = render(&Scene::draw(1, k as u64, &overrides), SMALL);
         let values = panorama.pixels().as_flattened();
-        assert!(values.iter().all(|v| v.is_finite() && *v > 0.0), "{fixed:?}");
+        assert!(values.iter().all(|v| v.is_finite() && *v > 0.0), "{overrides:?}");
         let (low, high) = values.iter().fold((f32::MAX, 0f32), |(a, b), v| (a.min(*v), b.max(*v)));
         ranges.push((high / low).ln());
     }
@@ -83,9 +83,9 @@ fn every_kind_of_scene_is_positive_and_finite() {
 
 /// Scenes of one weather on an empty plain, with the camera's white balance off.
 fn under(sky: SkyKind, count: u64) -> impl Iterator<Item = Scene> {
-    let fixed = Fixed { sky: Some(sky), place: Some(Place::Plain), ..Fixed::default() };
+    let overrides = Overrides { sky: Some(sky), place: Some(Place::Plain), ..Overrides::default() };
     (0..count).map(move |index| {
-        let scene = Scene::draw(31, index, &fixed);
+        let scene = Scene::draw(31, index, &overrides);
         Scene { ridges: Vec::new(), fullness: 0.0, white: [1.0; 3], lit: false, ..scene }
     })
 }
@@ -146,9 +146,9 @@ fn every_place_shows_as_much_sky_as_its_name_says() {
         Place::Forest => (0.0..0.1, 0.0),
     };
     for place in Place::ALL {
-        let fixed = Fixed { sky: Some(SkyKind::Cloudy), place: Some(place), ..Fixed::default() };
+        let overrides = Overrides { sky: Some(SkyKind::Cloudy), place: Some(place), ..Overrides::default() };
         let shares: [f32; 24] = std::array::from_fn(|index| {
-            let scene = Scene::draw(32, index as u64, &fixed);
+            let scene = Scene::draw(32, index as u64, &overrides);
             let stage = stage::Stage::new(&scene);
             let open = sky::spiral(400).filter(|d| stage.is_clear(*d, f32::INFINITY)).count();
             open as f32 / 400.0
@@ -165,15 +165,15 @@ fn the_sun_is_drawn_where_any_scene_says_it_is() {
     for k in 0..48 {
         // every third of a turn and 7° more: no two at one place of a pixel
         let (azimuth, elevation) = (127.0 * k as f32 % 360.0, 3.0 + 83.0 * k as f32 / 47.0);
-        let fixed = Fixed {
+        let overrides = Overrides {
             sky: Some(SkyKind::Clear),
             place: Some(Place::PureSky),
             sun_elevation: Some(elevation),
             sun_azimuth: Some(azimuth),
             cloud_cover: Some(0.0),
-            ..Fixed::default()
+            ..Overrides::default()
         };
-        let scene = Scene::draw(33, k, &fixed);
+        let scene = Scene::draw(33, k, &overrides);
         let panorama = render(&scene, grid);
         let brightness = |(_, p): &(usize, &[f32; 3])| luminance(**p);
         let all = panorama.pixels().iter().enumerate();
@@ -252,7 +252,7 @@ fn the_sun_is_where_it_was_asked_for_with_its_energy_at_any_size() {
     let overcast = Scene::draw(
         3,
         1,
-        &Fixed { sky: Some(SkyKind::Overcast), sun_elevation: Some(35.0), ..Fixed::default() },
+        &Overrides { sky: Some(SkyKind::Overcast), sun_elevation: Some(35.0), ..Overrides::default() },
     );
     let overcast =
         Scene { sun_azimuth: 40.0, ridges: Vec::new(), fullness: 0.0, place: Place::Plain, ..overcast };
@@ -261,13 +261,13 @@ fn the_sun_is_where_it_was_asked_for_with_its_energy_at_any_size() {
 
 #[test]
 fn a_hidden_sun_is_moved_to_where_it_is_in_view() {
-    let clear = Fixed { place: Some(Place::Square), sky: Some(SkyKind::Clear), ..Fixed::default() };
+    let clear = Overrides { place: Some(Place::Square), sky: Some(SkyKind::Clear), ..Overrides::default() };
     let in_view = |s: &Scene| stage::Stage::new(s).is_clear(s.sun_direction(), f32::INFINITY);
     let mut moved = 0;
     for index in 0..40 {
-        let up = Scene::draw(4, index, &Fixed { sun_elevation: Some(18.0), ..clear });
+        let up = Scene::draw(4, index, &Overrides { sun_elevation: Some(18.0), ..clear });
         // below the horizon nobody looks for it, and the azimuth drawn is the same
-        let down = Scene::draw(4, index, &Fixed { sun_elevation: Some(-1.0), ..clear });
+        let down = Scene::draw(4, index, &Overrides { sun_elevation: Some(-1.0), ..clear });
         let first = Scene { sun_azimuth: down.sun_azimuth, ..up.clone() };
         if first != up {
             moved += 1;
@@ -308,13 +308,13 @@ fn illuminance_follows_hour_and_weather() {
 
 #[test]
 fn fixed_values_out_of_range_are_refused_by_name() {
-    for (fixed, name) in [
-        (Fixed { turbidity: Some(0.5), ..Fixed::default() }, "turbidity 0.5"),
-        (Fixed { cloud_cover: Some(1.5), ..Fixed::default() }, "cloud cover 1.5"),
-        (Fixed { sun_elevation: Some(f32::NAN), ..Fixed::default() }, "sun elevation"),
+    for (overrides, name) in [
+        (Overrides { turbidity: Some(0.5), ..Overrides::default() }, "turbidity 0.5"),
+        (Overrides { cloud_cover: Some(1.5), ..Overrides::default() }, "cloud cover 1.5"),
+        (Overrides { sun_elevation: Some(f32::NAN), ..Overrides::default() }, "sun elevation"),
     ] {
-        let message = fixed.check().unwrap_err().to_string();
+        let message = overrides.check().unwrap_err().to_string();
         assert!(message.contains(name), "{message}");
     }
-    assert!(Fixed::default().check().is_ok());
+    assert!(Overrides::default().check().is_ok());
 }

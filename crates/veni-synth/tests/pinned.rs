@@ -2,7 +2,7 @@
 
 use veni_image::luminance;
 use veni_light::sphere::Equirect;
-use veni_synth::{Fixed, Scene, render};
+use veni_synth::{Overrides, Scene, render};
 
 /// Seed and index; digests of the parameters and of the pixels at 32 × 16, mean luminance (kcd/m²).
 const SCENES: [([u64; 2], u64, u64, f64); 3] = [
@@ -32,7 +32,7 @@ fn three_scenes_keep_their_parameters_and_their_pixels() {
     let grid = Equirect::new(32, 16);
     let mut found = Vec::new();
     for ([seed, index], ..) in SCENES {
-        let scene = Scene::draw(seed, index, &Fixed::default());
+        let scene = Scene::draw(seed, index, &Overrides::default());
         let panorama = render(&scene, grid);
         let values = panorama.pixels().as_flattened().iter();
         let weighted = panorama.pixels().iter().enumerate();

@@ -10,7 +10,7 @@ use std::time::Instant;
 use burn::tensor::Tensor;
 use veni_core::data::Splits;
 use veni_core::train::batch::Batches;
-use veni_core::train::config::DecoderBy;
+use veni_core::train::config::DecoderBackend;
 use veni_core::train::network::{Network, Prepared};
 use veni_core::train::optimiser::{Group, Optimiser};
 use veni_core::train::presets::Preset;
@@ -72,8 +72,8 @@ fn main() -> Result<()> {
         let prepared = Prepared::Panoramas(batch.clone());
         let mut gradients =
             |part, by| clock.time(part, counts, || network.gradients(&prepared, &loss, by, &device).1);
-        gradients("whole step: gradients by tensor operations", DecoderBy::Tensors);
-        let found = gradients("whole step: gradients by kernels", DecoderBy::Kernels);
+        gradients("whole step: gradients by tensor operations", DecoderBackend::Tensors);
+        let found = gradients("whole step: gradients by kernels", DecoderBackend::Kernels);
         let rates = config.groups().into_iter().map(|(_, g)| g.learning_rate.at(step)).collect::<Vec<_>>();
         (network, _) = clock.time("whole step: Adam, clipping, average", counts, || {
             optimiser.step(network.clone(), &found, &rates)

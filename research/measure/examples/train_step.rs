@@ -50,7 +50,7 @@ fn main() -> Result<()> {
     let splits = Splits::open(&config.data, config.seed)?;
     let opened = config.device.open_all(&config.devices)?;
     let devices: Vec<_> = opened.into_iter().map(|opened| opened.device.autodiff()).collect();
-    config.decoder_by.check()?;
+    config.decoder_backend.check()?;
     let start_bytes = status_bytes("VmRSS");
     let network = Network::new(&config, splits.train.len(), &devices[0])?;
     let parameters: usize = weights::read(&network, "").values().map(|w| w.data.len()).sum();

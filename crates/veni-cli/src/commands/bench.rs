@@ -47,7 +47,7 @@ pub(crate) struct Bench {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// Also decoders for so many latent vectors, of the paper's size and with weights made by formula
+    /// Also decoders with N latent vectors, of the paper's size and with weights made by formula
     #[arg(long, value_name = "N", value_delimiter = ',', num_args = 1.., default_value = "9,100")]
     latent_vectors: Vec<usize>,
 

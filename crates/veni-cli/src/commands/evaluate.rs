@@ -38,15 +38,15 @@ const MIN_HEIGHT: usize = 8;
     long_about = "Run an experiment of the paper on models and panoramas.\n\n\
         Tables go to stdout and, with those of every panorama, into OUT, beside figures (PNG). Whatever takes long is \
         kept in OUT/results, one small file per panorama and setting: run the same command again after a stop and it \
-        goes on; run it with other models, panoramas or settings and only what is new is computed.\n\n\
+        continues; run it with other models, panoramas or settings and only what is new is computed.\n\n\
         DIR holds equirectangular OpenEXR or Radiance files; of a folder with train/ and val/ inside, val/ is taken. \
         Every definition is in docs/MODEL.md, Evaluation.\n\n\
         --shard I/N computes a share of what is kept, and makes no tables; once all shares are there, the same command \
         without it finds them. They may run at once, on machines with one file system.\n\n\
         LPIPS needs weights, which do not come with this program: name a safetensors file or what torch.save wrote, \
         with AlexNet's features (torchvision's alexnet-owt-….pth, 'features.N.weight') and the five heads (the lpips \
-        package's weights/v0.1/alex.pth, 'linL.model.1.weight'), in one file or in two; a checkpoint of the authors' \
-        trainer has both. Without, the column says \"no weights\".",
+        package's weights/v0.1/alex.pth, 'linL.model.1.weight'), in one file or in two; a checkpoint of the reference \
+        implementation's trainer has both. Without, the column says \"no weights\".",
     after_help = "Examples:\n  \
         veni-cli evaluate reconstruction --data hdri --out eval\n  \
         veni-cli evaluate reconstruction --model ours=runs/a base=runs/b --data hdri --out eval --quick\n  \
@@ -80,7 +80,7 @@ pub(crate) struct Evaluate {
     #[arg(long, value_name = "FILE", num_args = 1..)]
     lpips: Vec<PathBuf>,
 
-    /// Bases of as many numbers as the models have, fitted to each panorama, as rows of reconstruction tables
+    /// Bases of the same dimension D as the models' latents, fitted to each panorama, as rows of reconstruction tables
     #[arg(long, value_enum, num_args = 1.., default_values_t = [BaselineName::Sh, BaselineName::Sg])]
     baselines: Vec<BaselineName>,
 
@@ -97,7 +97,7 @@ pub(crate) struct Evaluate {
     #[arg(long, value_name = "I/N", value_parser = fold)]
     fold: Option<Fold>,
 
-    /// Only the first so many panoramas by name
+    /// Only the first N panoramas by name
     #[arg(long, value_name = "COUNT")]
     images: Option<usize>,
 
@@ -113,7 +113,7 @@ pub(crate) struct Evaluate {
     #[arg(long, value_name = "COUNT", default_value = "9")]
     frames: usize,
 
-    /// More numbers of the articles to stand beside ours (paper): JSON {table: {row: {column: number}}}; VENI's LDR
+    /// More numbers of the papers to compare with (paper): JSON {table: {row: {column: number}}}; VENI's LDR
     /// PSNR is known
     #[arg(long, value_name = "FILE")]
     published: Option<PathBuf>,
@@ -133,15 +133,15 @@ pub(crate) enum Protocol {
     Consistency,
     /// Strips from one panorama to the next, and how even their steps are
     Interpolation,
-    /// Encoder, decoder and both under turns and reflections
+    /// Encoder, decoder and both under rotations and reflections
     Equivariance,
     /// Reconstruction by models trained on more and fewer panoramas
     DatasetSize,
     /// Models that differ in one part, side by side
     Ablations,
-    /// The light on a shaded ball, from dull to shiny
+    /// The light on a rendered ball (inverse rendering), from dull to shiny
     InverseRendering,
-    /// All of them, with published numbers beside ours
+    /// All of them, with published numbers to compare with
     Paper,
 }
 
@@ -186,7 +186,7 @@ impl Evaluate {
         let lpips =
             if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
         let bars = Bars::new(report);
-        let data = Dataset::load_heard(&files, grid, &|done, all| bars.loading(done, all));
+        let data = Dataset::load_with_progress(&files, grid, &|done, all| bars.loading(done, all));
         bars.end();
         let data = data.map_err(with_remedy)?;
         inputs::create_folder(&self.out)?;
@@ -203,7 +203,7 @@ impl Evaluate {
             settings,
             store: &store,
             figures: &figures,
-            watch: &bars,
+            observer: &bars,
         };
         if self.shard.is_part() {
             let (at, of) = self.shard.place();

@@ -50,7 +50,7 @@ use shaded::Shaded;
         Examples:\n  \
         veni-cli fit sky.exr -o sky.json\n  \
         veni-cli fit *.exr --out-dir latents --shard 2/4     the second of four processes\n  \
-        veni-cli fit half.exr --mask known.png -o sky.json --completed whole.exr --uncertainty doubt.png\n  \
+        veni-cli fit half.exr --mask known.png -o sky.json --completed whole.exr --uncertainty std.png\n  \
         veni-cli fit photo.jpg --fov 65 --look 90,10 -o sky.json --completed whole.exr\n  \
         veni-cli fit ball.exr --normals n.exr --mask m.png --ks 0.2 -o light.json --completed light.exr\n  \
         veni-cli fit sky.exr --preset display -o sky.json && veni-cli bake sky.json -o again.exr"
@@ -67,8 +67,8 @@ pub(crate) struct Fit {
     #[arg(long, value_name = "OUT")]
     completed: Option<PathBuf>,
 
-    /// Also write how much the starts disagree: standard deviation of log radiance (.exr, or .png as a heat map
-    /// up to one stop)
+    /// Also write an uncertainty map, how much the starts disagree: standard deviation of log radiance (.exr, or .png
+    /// as a heat map up to one stop)
     #[arg(long, value_name = "OUT")]
     uncertainty: Option<PathBuf>,
 
@@ -249,8 +249,8 @@ impl Fit {
         let prior = model.prior();
         let bars = Bars::new(report);
         bars.begin("", "step", Some(config.steps * starts.len() as u64));
-        let mut watch = |step, loss| bars.advance(step, &format!("loss {loss:.4}"));
-        let best = best_light(model.decoder(), &image, Some(&prior), &starts, &config, &mut watch);
+        let mut observer = |step, loss| bars.advance(step, &format!("loss {loss:.4}"));
+        let best = best_light(model.decoder(), &image, Some(&prior), &starts, &config, &mut observer);
         bars.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         for latent in best.all.iter_mut().chain([&mut best.latent]) {
@@ -335,7 +335,7 @@ impl Fit {
     }
 }
 
-/// The article's protocol, on the pixels that were fitted.
+/// The paper's protocol, on the pixels that were fitted.
 fn score(model: &FitModel, latent: &Latent, seen: &Observation) -> Result<Scores> {
     let Equirect { width, height } = seen.grid;
     let decoded = model.decode(seen.grid, latent)?;

@@ -38,7 +38,7 @@ use store::{Settings, Store};
         is refused and listed with the reason. Sources are never changed.\n\n\
         Panoramas of one capture stay on one side of the split: by name (street_01_4k, street_02_ev-2 and \
         street_01_puresky are one capture; numbers of three digits or more are captures of their own) and by content \
-        (near-duplicates at another exposure, turned about the vertical or mirrored). The side follows from --seed and the \
+        (near-duplicates at another exposure, rotated about the vertical or mirrored). The side follows from --seed and the \
         capture's name alone. Files inside folders named train, val or test keep their side, unless a near-duplicate is held out.\n\n\
         With --expand-with, a network of your own rebuilds what is clipped: an ONNX file with one float input and \
         one float output, both 1 x 3 x H x W (R, G, B; row 0 is up). It is given the panorama's values in [0, 1], \
@@ -48,8 +48,8 @@ use store::{Settings, Store};
         mixed. Where H and W are free, the panorama is continued round the sides and over the poles by 64 pixels or \
         more, to sides that are multiples of 32; where they are fixed, it is resampled to them. Panoramas for which \
         it gives NaN, infinity or negative radiance are refused.\n\n\
-        Stopped half-way, the same command goes on where it was; run again, it takes in only what is new or changed. \
-        --force begins anew and removes what an earlier run wrote into DIR, nothing else.",
+        Stopped half-way, the same command continues where it was; run again, it takes in only what is new or changed. \
+        --force starts over and removes what an earlier run wrote into DIR, nothing else.",
     after_help = format!("Exit code 1: ready, but some files were refused.\n\n\
         Examples:\n  \
         veni-cli prepare panoramas/ -o data{}\n  \
@@ -83,7 +83,7 @@ pub(crate) struct Prepare {
     #[arg(long, short, value_name = "S", default_value = "0")]
     seed: u64,
 
-    /// Split anew also what lies in folders named train, val or test
+    /// Split again also what lies in folders named train, val or test
     #[arg(long)]
     resplit: bool,
 
@@ -116,7 +116,7 @@ impl Prepare {
         }
         if self.force.force && self.shard.is_part() {
             bail!(
-                "--force would remove what other shards have done: begin anew without --shard, or remove {}",
+                "--force would remove what other shards have done: start over without --shard, or remove {}",
                 self.output.display()
             );
         }
@@ -146,5 +146,5 @@ impl Prepare {
 
 fn share(text: &str) -> Result<f64, String> {
     let share = text.parse().ok().filter(|s| (0.0..1.0).contains(s));
-    share.ok_or_else(|| format!("'{text}' is no share: give a number from 0 to below 1, like 0.1"))
+    share.ok_or_else(|| format!("'{text}' is not a share: give a number from 0 to below 1, like 0.1"))
 }

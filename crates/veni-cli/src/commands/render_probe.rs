@@ -37,7 +37,7 @@ const PLAIN: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
         The light is an HDR panorama (as it is, not through the encoder), a latent file, or a random sky named by \
         --seed. The surface is Lambertian, or Blinn-Phong with --ks. Radiance is physically right: the sum over the \
         light's pixels of reflectance x radiance x cosine x solid angle. Every pixel sees the whole sky: there are no \
-        shadows and no interreflections, as in the article.{}",
+        shadows and no interreflections, as in the paper.{}",
         "\n\nWith --normals and --mask this makes the inputs from which 'veni-cli fit' recovers the light."),
     after_help = "World: z up; the middle of a panorama lies at +x, its right at -y. The camera looks along --azimuth, which \
         turns from +x to +y, and is raised by --elevation; it frames the sphere or mesh whole. Normals are unit vectors \

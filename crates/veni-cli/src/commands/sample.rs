@@ -83,7 +83,7 @@ impl FromStr for Grid {
         let parse = |t: &str| t.trim().parse().ok().filter(|n| *n > 0);
         let sides = text.split_once(['x', 'X', '×']).and_then(|(c, r)| Some((parse(c)?, parse(r)?)));
         let (columns, rows) =
-            sides.ok_or_else(|| format!("'{text}' is no grid: give columns x rows, like 4x4"))?;
+            sides.ok_or_else(|| format!("'{text}' is not a grid: give columns x rows, like 4x4"))?;
         Ok(Self { columns, rows })
     }
 }
@@ -110,7 +110,7 @@ impl Sample {
             );
         }
         let Some(last) = self.seed.checked_add(count as u64 - 1) else {
-            bail!("--seed {}: leaves no room for {count} seeds; give a smaller one", self.seed);
+            bail!("--seed {}: leaves fewer than {count} seeds; give a smaller one", self.seed);
         };
         let files = self.latent_files(last, overwrite)?;
         let Loaded { model, name } = source::model(&self.decoding.model)?;

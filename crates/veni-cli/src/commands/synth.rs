@@ -14,8 +14,8 @@ use veni_light::output::Overwrite;
 use veni_image::tonemap::Tonemap;
 use veni_image::{Panorama, Precision};
 use veni_light::sphere::Equirect;
-use veni_synth::{Fixed, Place, Scene, SkyKind, generate};
 use veni_image::Sheet;
+use veni_synth::{Overrides, Place, Scene, SkyKind, generate};
 
 use crate::args::Force;
 use crate::features::{LEARN, only};
@@ -136,7 +136,7 @@ impl Synth {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
         let started = Instant::now();
         let overwrite = Overwrite::from(self.force);
-        let fixed = self.fixed()?;
+        let overrides = self.overrides()?;
         let (width, height) = self.size.equirect()?;
         let grid = Equirect::new(width, height);
         if !(1..=MAX_COUNT).contains(&self.count) {
@@ -197,7 +197,7 @@ impl Synth {
             },
             None => true,
         };
-        generate(self.seed, 0..self.count, &fixed, grid, wanted, |scene, panorama| -> Result<()> {
+        generate(self.seed, 0..self.count, &overrides, grid, wanted, |scene, panorama| -> Result<()> {
             if let Some(files) = &files {
                 files.write(&scene, &panorama).map_err(with_remedy)?;
             }
@@ -216,8 +216,8 @@ impl Synth {
         Ok(Outcome::Fine)
     }
 
-    fn fixed(&self) -> Result<Fixed> {
-        let fixed = Fixed {
+    fn overrides(&self) -> Result<Overrides> {
+        let overrides = Overrides {
             sky: self.scene,
             place: self.place,
             sun_elevation: self.sun_elevation,
@@ -226,8 +226,8 @@ impl Synth {
             cloud_cover: self.cloud_cover,
             ground_albedo: self.ground_albedo,
         };
-        fixed.check()?;
-        Ok(fixed)
+        overrides.check()?;
+        Ok(overrides)
     }
 
     fn new_sheet(&self, grid: Equirect, overwrite: Overwrite) -> Result<Option<Sheet>> {

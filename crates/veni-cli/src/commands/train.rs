@@ -4,7 +4,7 @@ mod args;
 mod command_line;
 mod config;
 mod folder;
-mod holding;
+mod pixel_storage;
 mod resume;
 
 use std::sync::Arc;
@@ -106,9 +106,9 @@ impl Train {
             );
         }
         self.check_same(&stored)?;
-        let holding = self.holding(&stored)?;
+        let storage = self.pixel_storage(&stored)?;
         let bars = Bars::new(report);
-        let trainer = Trainer::resume_heard(&self.out, &self.command_line(), &holding, &|done, all| {
+        let trainer = Trainer::resume_with(&self.out, &self.command_line(), &storage, &|done, all| {
             bars.loading(done, all);
         });
         bars.end();
@@ -175,7 +175,7 @@ fn note_device(config: &TrainConfig, report: Report) -> Result<()> {
             report.note(format_args!("{} is a software adapter; --device flex is faster", opened.name));
         }
     }
-    if config.decoder_by.is_kernels() {
+    if config.decoder_backend.is_kernels() {
         report.note("decoder_by = kernels: the decoder is computed by the processor, not on the device");
     }
     Ok(())

@@ -119,7 +119,7 @@ impl Conditioned {
             each(row).map_err(veni_gpu::Error::Core)
         });
         rows.map_err(|error| match error {
-            // what `each` said is no fault of the device
+            // what `each` said is not a fault of the device
             veni_gpu::Error::Core(error) => error,
             error => veni_light::Error::unsupported(format!("{name}: {error}; try --device cpu")),
         })

@@ -1,6 +1,6 @@
-//! What the library tells of its work.
+//! Progress as the library reports it.
 
-use veni_eval::protocol::Watch;
+use veni_eval::protocol::Observer;
 use veni_image::metrics::MeanScores;
 use veni_core::train::progress::{Progress, StepReport, ValidationReport};
 
@@ -25,7 +25,7 @@ impl Bars {
     }
 }
 
-impl Watch for Bars {
+impl Observer for Bars {
     fn begin(&self, unit: &'static str, task: &str, done: usize, total: usize) {
         self.end();
         if done > 0 {

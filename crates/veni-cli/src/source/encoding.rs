@@ -16,7 +16,7 @@ use super::model::Loaded;
 use crate::latent_files::source_of;
 use crate::report::Report;
 
-/// The resolution at which a panorama is encoded and scored: that of the training data of the article.
+/// The resolution at which a panorama is encoded and scored: that of the training data of the paper.
 const GRID: [usize; 2] = [128, 64];
 
 /// A panorama's latent and how good it is.
@@ -64,7 +64,7 @@ impl<'a> Encoding<'a> {
         let mut decoded = vec![[0.0; 3]; grid.len()];
         field.log_radiance_batch(&grid.directions(), &mut decoded);
         let prediction: Vec<f32> = decoded.as_flattened().iter().map(|v| v - item.log_exposure).collect();
-        // the article's protocol, as in training
+        // the paper's protocol, as in training
         let scores = scores(&prediction, &item.log_radiance, grid.height, grid.width, Alignment::LogFactor);
         Ok(Encoded { latent, scores, panorama, field })
     }

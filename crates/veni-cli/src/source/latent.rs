@@ -19,8 +19,8 @@ pub(crate) fn model_of<'a>(args: &ModelArgs, files: impl IntoIterator<Item = &'a
     if args.model.is_none() {
         // what cannot be read is reported when it is its turn
         let latent = files.into_iter().find_map(|path| stored(path).ok().flatten());
-        if let Some(numbers) = latent.and_then(|latent| inside(&latent)) {
-            return embedded(numbers);
+        if let Some(dimension) = latent.and_then(|latent| inside(&latent)) {
+            return embedded(dimension);
         }
     }
     model(args)
@@ -83,16 +83,16 @@ fn check(latent: &Latent, Loaded { model, name }: &Loaded) -> Result<()> {
 /// The model that a latent belongs to, and how to name it.
 fn owner(latent: &Latent) -> String {
     match inside(latent) {
-        Some(numbers) => format!("its own model, which is inside this program, with --model {numbers}"),
+        Some(dimension) => format!("its own model, which is inside this program, with --model {dimension}"),
         None => "the latent's own model with --model FILE".to_owned(),
     }
 }
 
-/// The size of the model inside this program that a latent says it belongs to.
+/// The latent dimension of the model inside this program that a latent says it belongs to.
 #[cfg(feature = "pretrained")]
 fn inside(latent: &Latent) -> Option<usize> {
-    let numbers = 3 * latent.vectors.len();
-    Model::pretrained_of(numbers).filter(|model| Some(model.hash()) == latent.model).map(|_| numbers)
+    let dimension = 3 * latent.vectors.len();
+    Model::pretrained_of(dimension).filter(|model| Some(model.hash()) == latent.model).map(|_| dimension)
 }
 
 #[cfg(not(feature = "pretrained"))]

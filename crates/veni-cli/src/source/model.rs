@@ -15,33 +15,36 @@ pub(crate) struct Loaded {
     pub(crate) name: String,
 }
 
-/// The model of `--model`: a file, the folder of a training run, or one inside the program, by its size.
+/// The model of `--model`: a file, the folder of a training run, or one inside the program, by its latent dimension.
 pub(crate) fn model(args: &ModelArgs) -> Result<Loaded> {
     let Some(path) = &args.model else {
         return embedded(SMALLEST);
     };
-    if let Some(numbers) = size(path) {
-        return embedded(numbers);
+    if let Some(dimension) = size(path) {
+        return embedded(dimension);
     }
     let path = model_file(path)?;
     Ok(Loaded { model: Model::load(&path)?, name: path.display().to_string() })
 }
 
-/// Numbers in a latent of the model that is taken where none is named.
+/// Latent dimension of the model that is taken where none is named.
 const SMALLEST: usize = 27;
 
-/// A number that is no file's or folder's name.
+/// A latent dimension, not the name of a file or folder.
 fn size(path: &Path) -> Option<usize> {
     path.to_str()?.parse().ok().filter(|_| !path.exists())
 }
 
 #[cfg(feature = "pretrained")]
-pub(super) fn embedded(numbers: usize) -> Result<Loaded> {
-    let model = Model::pretrained_of(numbers).ok_or_else(|| {
+pub(super) fn embedded(dimension: usize) -> Result<Loaded> {
+    let model = Model::pretrained_of(dimension).ok_or_else(|| {
         let sizes: Vec<_> = Model::pretrained_sizes().map(|size| size.to_string()).collect();
-        anyhow!("--model {numbers}: this program has models of {} numbers inside", sizes.join(", "))
+        anyhow!(
+            "--model {dimension}: this program has models of latent dimension {} inside",
+            sizes.join(", ")
+        )
     })?;
-    Ok(Loaded { model, name: format!("the model of {numbers} numbers inside this program") })
+    Ok(Loaded { model, name: format!("the model of latent dimension {dimension} inside this program") })
 }
 
 #[cfg(not(feature = "pretrained"))]

@@ -75,7 +75,7 @@ pub fn fit<'a>(
     fit_observed(decoder, target, start, config, &mut |_, _| {})
 }
 
-/// [`fit`] with an observer, who is told the number of updates made and the loss, before each update.
+/// [`fit`] with a progress callback, which gets the number of updates made and the loss, before each update.
 ///
 /// # Errors
 /// As [`fit`].

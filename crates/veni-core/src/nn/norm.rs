@@ -1,6 +1,6 @@
 //! Lengths of vectors, safe at zero.
 //!
-//! √s has an infinite slope at 0, and 0 · ∞ is NaN; masking the result afterwards does not help. Here s is
+//! √s has an infinite derivative at 0, and 0 · ∞ is NaN; masking the result afterwards does not help. Here s is
 //! clamped *before* the root: below the clamp the gradient is cut, which gives a norm its customary subgradient
 //! 0 at the origin.
 

@@ -78,7 +78,7 @@ pub fn vn_relu(q: Tensor<4>, k: Tensor<4>, form: VnReluForm) -> Tensor<4> {
         VnReluForm::ReferenceNormGuard => square.clamp_min(1e-12).sqrt(),
     };
     let along = (q.clone() * k.clone()).sum_dim(COORDINATE);
-    // relu(−⟨q, k⟩), not min(⟨q, k⟩, 0): its slope at 0 is 0, as on the side where q passes unchanged.
+    // relu(−⟨q, k⟩), not min(⟨q, k⟩, 0): its derivative at 0 is 0, as on the side where q passes unchanged.
     q + k * (relu(-along) / divisor)
 }
 

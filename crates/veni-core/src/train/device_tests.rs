@@ -10,7 +10,7 @@ use std::path::Path;
 use veni_data::{Dataset, Item};
 use veni_image::Panorama;
 use veni_light::sphere::Equirect;
-use crate::train::config::{DecoderBy, DeviceKind, TrainConfig};
+use crate::train::config::{DecoderBackend, DeviceKind, TrainConfig};
 use crate::train::network::{Network, Prepared};
 use crate::train::presets::Preset;
 use crate::train::replicas::Replicas;
@@ -70,7 +70,7 @@ struct Step {
 }
 
 /// The step of `batch` on a device, from the weights of the configuration's seed or from others.
-fn step_on(kind: DeviceKind, by: DecoderBy, config: &TrainConfig, from: Option<&Weights>) -> Step {
+fn step_on(kind: DeviceKind, by: DecoderBackend, config: &TrainConfig, from: Option<&Weights>) -> Step {
     let device = kind.device().unwrap().autodiff();
     let skies = skies();
     let mut network = Network::new(config, skies.len(), &device).unwrap();
@@ -124,11 +124,11 @@ fn every_device_computes_the_same_step() {
     reni.loss.kld = WeightSchedule::Constant(0.01);
     reni.latents.as_mut().unwrap().free_exposure = true;
     for config in [veni, reni] {
-        let expected = step_on(DeviceKind::Flex, DecoderBy::Tensors, &config, None);
+        let expected = step_on(DeviceKind::Flex, DecoderBackend::Tensors, &config, None);
         let (terms, parameters) = (expected.parts.len(), expected.gradients.len());
         assert!(terms >= 3 && parameters > 15, "{terms} losses, {parameters} gradients");
         for kind in devices() {
-            for by in [DecoderBy::Tensors, DecoderBy::Kernels] {
+            for by in [DecoderBackend::Tensors, DecoderBackend::Kernels] {
                 let found = deviations(&expected, &step_on(kind, by, &config, None));
                 say(&format!("{:?}: {kind:?} by {by:?}: {found:.3?} of what is allowed", config.model.kind));
                 assert!(found.iter().all(|d| *d < 1.0), "{kind:?}, {by:?}: {found:?} of what is allowed");
@@ -142,7 +142,7 @@ fn every_device_computes_the_same_step() {
 #[test]
 fn devices_of_every_kind_share_a_batch() {
     let mut config = Preset::Tiny.config(3);
-    (config.batch, config.decoder_by) = (5, DecoderBy::Tensors);
+    (config.batch, config.decoder_backend) = (5, DecoderBackend::Tensors);
     let skies = skies();
     let kinds = devices();
     let opened: Vec<_> = kinds.iter().map(|kind| kind.device().unwrap().autodiff()).collect();
@@ -201,14 +201,14 @@ fn a_device_that_computes_something_else_is_caught() {
     let kind = *devices().last().unwrap();
     let device = kind.device().unwrap();
     let weights = weights::read(&Network::new(&config, 2, &device).unwrap(), "");
-    let expected = step_on(DeviceKind::Flex, DecoderBy::Tensors, &config, None);
+    let expected = step_on(DeviceKind::Flex, DecoderBackend::Tensors, &config, None);
     for (part, at) in [("encoder.", 2), ("decoder.", 1)] {
         let mut broken = weights.clone();
         let named = broken.iter_mut().filter(|(name, _)| name.starts_with(part));
         let (name, weight) = named.max_by_key(|(_, weight)| weight.data.len()).unwrap();
         let name = name.clone();
         weight.data.iter_mut().for_each(|w| *w *= 1.001);
-        let found = deviations(&expected, &step_on(kind, DecoderBy::Tensors, &config, Some(&broken)));
+        let found = deviations(&expected, &step_on(kind, DecoderBackend::Tensors, &config, Some(&broken)));
         assert!(found[at] > 3.0, "{name}: {found:?}");
     }
 }
@@ -217,14 +217,14 @@ fn a_device_that_computes_something_else_is_caught() {
 /// them, so that it was at work. Elsewhere the step is refused before it begins.
 #[test]
 fn bfloat16_computes_nearly_the_same_step() {
-    let by = DecoderBy::KernelsBfloat16;
+    let by = DecoderBackend::KernelsBfloat16;
     if let Err(error) = by.check() {
         say(&format!("bfloat16 skipped: {error}"));
         assert!(error.to_string().contains("take decoder_by = kernels"), "{error}");
         return;
     }
     for config in [Preset::Tiny.config(3), Preset::Tiny.auto_decoder(3)] {
-        let expected = step_on(DeviceKind::Flex, DecoderBy::Kernels, &config, None);
+        let expected = step_on(DeviceKind::Flex, DecoderBackend::Kernels, &config, None);
         let found = step_on(DeviceKind::Flex, by, &config, None);
         for (name, value) in &expected.parts {
             let apart = (value - found.parts[name]).abs() / value.abs();

@@ -26,9 +26,9 @@ pub struct LatentsConfig {
     pub free_exposure: bool,
     /// How validation panoramas, which have no row in the table, get their latents: from zero.
     pub validation: FitConfig,
-    /// At most so many of them are fitted, the first ones.
+    /// At most N of them are fitted, the first N.
     pub validation_panoramas: usize,
-    /// The fit sees panoramas averaged over so many pixels along each side.
+    /// The fit sees panoramas averaged over this many pixels along each side.
     pub validation_factor: usize,
 }
 

@@ -7,7 +7,7 @@
 use burn::tensor::{Device, Gradients, Tensor};
 
 use crate::train::batch::Batch;
-use crate::train::config::DecoderBy;
+use crate::train::config::DecoderBackend;
 use crate::train::loss::{Loss, LossTerms, Term};
 use crate::train::network::{Network, Prepared};
 use crate::train::rays::RayBatch;
@@ -23,12 +23,12 @@ pub(super) fn gradients(
     network: &Network,
     batch: &Prepared,
     loss: &Loss,
-    by: DecoderBy,
+    by: DecoderBackend,
     device: &Device,
 ) -> (LossTerms, Gradients) {
     let prepare = |decoder: &Decoder, latent| {
         let native = decoder.native(latent).expect("a network that folds");
-        if by == DecoderBy::KernelsBfloat16 {
+        if by == DecoderBackend::KernelsBfloat16 {
             native.in_bfloat16().expect("checked by the run")
         } else {
             native
@@ -57,8 +57,8 @@ fn of_panoramas(
     let decoded = decoder.forward(directions, directions.len());
     let [rows, columns] = batch.loss_size;
     let image = Image { shape: [batch.images, rows, columns, 3], target: &batch.target, step };
-    let (terms, slopes) = image.terms(loss, &decoded, device);
-    let back = decoder.backward(directions, directions.len(), &slopes);
+    let (terms, by_output) = image.terms(loss, &decoded, device);
+    let back = decoder.backward(directions, directions.len(), &by_output);
     finish(terms, kld, back)
 }
 
@@ -83,10 +83,10 @@ fn of_rays(
         }
     }
     let image = Image { shape: [images, rays, 1, 3], target: &batch.target, step };
-    let (terms, slopes) = image.terms(loss, &decoded, device);
-    let mut back = decoder.backward(directions, rays, &slopes);
+    let (terms, by_output) = image.terms(loss, &decoded, device);
+    let mut back = decoder.backward(directions, rays, &by_output);
     if let Some(scale) = rows.scale {
-        let sums: Vec<f32> = slopes.chunks_exact(3 * rays).map(|image| image.iter().sum()).collect();
+        let sums: Vec<f32> = by_output.chunks_exact(3 * rays).map(|image| image.iter().sum()).collect();
         back = back + (scale * tensor(&sums, [images, 1, 1], device)).sum();
     }
     let kld = loss.kld(step, rows.mean, rows.log_variance);
@@ -102,15 +102,15 @@ struct Image<'a> {
 }
 
 impl Image<'_> {
-    /// The image losses of log radiance, and their sum's derivatives by it.
+    /// The image losses of log radiance, and their sum's derivatives with respect to it.
     fn terms(&self, loss: &Loss, decoded: &[f32], device: &Device) -> (LossTerms, Vec<f32>) {
         let prediction: Tensor<4> = tensor(decoded, self.shape, device).require_grad();
         let terms = loss.image_terms(self.step, prediction.clone(), tensor(self.target, self.shape, device));
         if terms.terms.is_empty() {
             return (terms, vec![0.0; decoded.len()]);
         }
-        let slopes = prediction.grad(&terms.total().backward()).expect("a loss of the prediction");
-        (terms, slopes.into_data().convert::<f32>().try_into_vec().expect("just converted to f32"))
+        let by_output = prediction.grad(&terms.total().backward()).expect("a loss of the prediction");
+        (terms, by_output.into_data().convert::<f32>().try_into_vec().expect("just converted to f32"))
     }
 }
 

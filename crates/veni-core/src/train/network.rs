@@ -7,7 +7,7 @@ use veni_data::Dataset;
 use veni_light::random::{Purpose, stream};
 use veni_light::model::ModelKind;
 use crate::train::batch::{Batch, Batches};
-use crate::train::config::{DecoderBy, TrainConfig};
+use crate::train::config::{DecoderBackend, TrainConfig};
 use crate::train::loss::{Loss, LossTerms};
 use crate::train::native;
 use crate::train::rays::{RayBatch, RayBatches};
@@ -98,12 +98,12 @@ impl Network {
     /// The weighted losses of a batch and the gradients of their sum.
     ///
     /// # Panics
-    /// As [`Network::terms`], and where [`DecoderBy::check`] refuses `by`.
+    /// As [`Network::terms`], and where [`DecoderBackend::check`] refuses `by`.
     pub fn gradients(
         &self,
         batch: &Prepared,
         loss: &Loss,
-        by: DecoderBy,
+        by: DecoderBackend,
         device: &Device,
     ) -> (LossTerms, Gradients) {
         if by.is_kernels() && self.decoder().config().check_folds().is_ok() {

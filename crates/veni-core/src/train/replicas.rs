@@ -13,7 +13,7 @@ use burn::tensor::Device;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::train::config::{DecoderBy, TrainConfig};
+use crate::train::config::{DecoderBackend, TrainConfig};
 use crate::train::loss::Loss;
 use crate::train::network::{Network, Prepared};
 use crate::vae::weights::{self, Weights};
@@ -23,7 +23,7 @@ use crate::{Error, Result};
 #[derive(Debug)]
 pub struct Replicas {
     all: Vec<Replica>,
-    by: DecoderBy,
+    by: DecoderBackend,
 }
 
 #[derive(Debug)]
@@ -52,7 +52,7 @@ impl Replicas {
     /// # Errors
     /// As [`Network::new`]; [`Error::Unsupported`] if threads cannot be started.
     pub fn new(network: Network, config: &TrainConfig, devices: &[Device]) -> Result<Self> {
-        let by = config.decoder_by;
+        let by = config.decoder_backend;
         let threaded = config.device.is_processor() || by.is_kernels();
         let count = if threaded { (rayon::current_num_threads() / devices.len()).max(1) } else { 1 };
         let threads = |at: usize| {
@@ -142,7 +142,7 @@ impl Replica {
         }
     }
 
-    fn compute(&self, batch: &Prepared, by: DecoderBy) -> Computed {
+    fn compute(&self, batch: &Prepared, by: DecoderBackend) -> Computed {
         let (terms, gradients) = self.network.gradients(batch, &self.loss, by, &self.device);
         let (value, parts) = terms.values();
         Computed { value, parts, gradients: weights::gradients(&self.network, "", &gradients) }

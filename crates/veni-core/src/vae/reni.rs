@@ -111,7 +111,7 @@ impl Reni {
         Ok(Self { decoder: network, latents: LatentTable::new(panoramas, n, free_exposure, rng, device) })
     }
 
-    /// The model file's content: the decoder, without a prior. The table is no part of it.
+    /// The model file's content: the decoder, without a prior. The table is not part of it.
     ///
     /// # Errors
     /// [`Error::Invalid`] if a weight is not finite.

@@ -111,7 +111,7 @@ fn parts_of_stripes_and_mirrors_are_approximate() {
     let mirrored = setup.encode(|image| mirror(setup.grid, image));
     let error = relative(&mirrored, latents.iter().map(Latent::mirrored));
     assert!((1e-4..0.5).contains(&error), "mirror: {error}");
-    // the wrong sense of turning is no small error
+    // the wrong sense of turning is not a small error
     let stripe = setup.grid.width / STRIPES;
     let turned = setup.encode(|image| turn_columns(setup.grid, image, stripe));
     let error = relative(&turned, latents.iter().map(|z| z.turned(-setup.angle(stripe))));

@@ -1,5 +1,5 @@
 //! The systems that VENI is compared with: an image's own expansion in spherical harmonics or spherical Gaussians, given
-//! as many numbers D as a latent has. No prior, no training, no tensors.
+//! the latent dimension D of a model. No prior, no training, no tensors.
 //!
 //! | system | what is expanded | numbers |
 //! |---|---|---|
@@ -7,8 +7,8 @@
 //! | [`Kind::SphericalGaussians`] | the same, in lobes of either sign | 6 per lobe + 3 |
 //! | [`Kind::GaussianMixture`] | radiance, in positive lobes; error in log radiance | 6 per lobe + 3 |
 //!
-//! All are fitted to the whole sphere with every pixel weighted by its solid angle, in the native frame. The authors'
-//! own forms, which golden files test, are in [`harmonics::reference`] and [`gaussians::reference`].
+//! All are fitted to the whole sphere with every pixel weighted by its solid angle, in the native frame. The reference
+//! implementation's own forms, which golden files test, are in [`harmonics::reference`] and [`gaussians::reference`].
 //!
 //! ```
 //! # use veni_core::{Result, baseline::{Baseline, Kind, Space}, sphere::Equirect};

@@ -89,7 +89,7 @@ impl Baseline {
     /// Fits the system to an image of natural-log radiance, `[height, width, 3]` on the pixel centres of `grid`.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the image does not have 3·W·H values, has one that is no logarithm of an f32, or has
+    /// [`Error::Invalid`] if the image does not have 3·W·H values, has one that is not a logarithm of an f32, or has
     /// too few pixels for the system; or if the search has no start or a rate outside (0, 1].
     pub fn fit(&self, grid: Equirect, log_radiance: &[f32]) -> Result<Fitted> {
         let target = |space| Target::new(grid, log_radiance, space);

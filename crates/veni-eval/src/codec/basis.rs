@@ -1,4 +1,4 @@
-//! The classical bases: spherical harmonics and spherical Gaussians of as many numbers.
+//! The classical bases: spherical harmonics and spherical Gaussians of the same dimension D.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! Ways to code a panorama in D numbers and to get it back: what reconstruction compares.
+//! Ways to code a panorama at latent dimension D and to get it back: what reconstruction compares.
 //!
 //! Every row of a reconstruction table is a [`Codec`]. A model's two passes are one each, a classical basis is
 //! one.
@@ -14,7 +14,7 @@ use serde_json::Value;
 use crate::Result;
 use veni_light::sphere::Equirect;
 
-/// A way to code a panorama in D numbers and to get it back.
+/// A way to code a panorama at latent dimension D and to get it back.
 pub trait Codec: Sync {
     /// The system, the row's name in tables.
     fn system(&self) -> &str;
@@ -22,14 +22,14 @@ pub trait Codec: Sync {
     /// Which of the system's ways this is ("autoencoder", "optimised", "least squares").
     fn pass(&self) -> &str;
 
-    /// D, the numbers per panorama.
+    /// The latent dimension D.
     fn dimension(&self) -> usize;
 
     /// Everything that decides a code besides the image: part of the key under which codes are kept.
     fn key(&self) -> Value;
 
-    /// D numbers for an image of log radiance at exposure 0 (3·W·H values). They depend on nothing else, so that what is
-    /// kept of one image stays true whatever it was coded beside.
+    /// The code, D values, for an image of log radiance at exposure 0 (3·W·H values). They depend on nothing else, so
+    /// that what is kept of one image stays true whatever it was coded beside.
     ///
     /// # Errors
     /// What the system says, naming itself.

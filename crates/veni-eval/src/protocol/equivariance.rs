@@ -23,7 +23,7 @@ use veni_light::sphere::Equirect;
 /// Latents that stand for all where there is no encoder to give some.
 const DRAWN: u64 = 4;
 /// Why a stripe cannot be turned by.
-const NARROW: &str = "stripes are no whole number of pixels";
+const NARROW: &str = "stripes are not a whole number of pixels";
 
 /// Table: one row per measure, one column per model; per model with an encoder the error over the angle as a curve.
 ///
@@ -37,12 +37,12 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     let mut columns: Vec<Vec<(&'static str, Cell)>> = Vec::new();
     let mut curves = Vec::new();
     for subject in run.subjects {
-        run.watch.begin("part", subject.name(), 0, 2);
+        run.observer.begin("part", subject.name(), 0, 2);
         let (encoder, curve) = encoder(run, subject)?;
-        run.watch.advance(1);
+        run.observer.advance(1);
         curves.extend(curve);
         columns.push(encoder.into_iter().chain(decoder(run, subject)?).collect());
-        run.watch.advance(1);
+        run.observer.advance(1);
     }
     let measures = columns.first().map_or(0, Vec::len);
     for row in 0..measures {
@@ -79,7 +79,7 @@ struct Encoding<'a> {
     grid: Equirect,
     images: Vec<&'a [f32]>,
     latents: Vec<Latent>,
-    /// Columns per stripe; 0 if that is no whole number.
+    /// Columns per stripe; 0 if that is not a whole number.
     stripe: usize,
 }
 
@@ -136,7 +136,7 @@ fn encoder(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<(Measures, Opt
         pair(turned(grid.width / 4, stripe > 0 && grid.width.is_multiple_of(4 * stripe))?, NARROW),
         pair(
             turned(stripe / 2, stripe > 1 && stripe.is_multiple_of(2))?,
-            "half a stripe is no whole number of pixels",
+            "half a stripe is not a whole number of pixels",
         ),
         pair(Some(encoding.errors(|image| mirror(grid, image), Latent::mirrored)?), ""),
     ];

@@ -1,4 +1,4 @@
-//! `inverse-rendering`: what a shaded ball tells of the light on it, from dull to mirror-like.
+//! `inverse-rendering`: what the rendered image of a ball tells of the light on it, from dull to mirror-like.
 //!
 //! Per panorama and K_s a white ball of Blinn-Phong reflectance is rendered under the panorama itself (physically, without
 //! shadows); a latent and an exposure are fitted to that picture alone, from latent 0; and the decoded light is

@@ -2,14 +2,14 @@
 //!
 //! | protocol | question |
 //! |---|---|
-//! | [`reconstruction`] | how much of a panorama survives D numbers? |
+//! | [`reconstruction`] | how much of a panorama survives a latent of dimension D? |
 //! | [`uniqueness`] | do two fits of one panorama end in the same place of latent space? |
 //! | [`consistency`] | are latents that are far apart panoramas that are far apart? |
 //! | [`interpolation`] | is the way from one panorama to another even? |
 //! | [`equivariance`] | does the latent turn with the panorama? |
 //! | [`dataset_size`] | what is more training data worth? |
 //! | [`ablations`] | what is each part of the model worth? |
-//! | [`inverse_rendering`] | what does a shaded ball tell of the light on it? |
+//! | [`inverse_rendering`] | what does the rendered image of a ball tell of the light on it? |
 //! | [`paper`] | all of them, with published numbers beside ours |
 //!
 //! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image; a
@@ -65,12 +65,12 @@ impl Default for Settings {
     }
 }
 
-/// Hears how far an evaluation has come. Several threads tell it.
-pub trait Watch: Sync {
+/// Observer of an evaluation's progress. Reported from several threads.
+pub trait Observer: Sync {
     /// A task begins that takes `total` units ("panorama"), `done` of them kept from an earlier run.
     fn begin(&self, unit: &'static str, task: &str, done: usize, total: usize);
 
-    /// So many more units are done.
+    /// This many more units are done.
     fn advance(&self, units: usize);
 }
 
@@ -91,8 +91,8 @@ pub struct Evaluation<'a> {
     pub store: &'a Store,
     /// The folder of figures.
     pub figures: &'a Path,
-    /// Who hears of progress.
-    pub watch: &'a dyn Watch,
+    /// Observer of progress.
+    pub observer: &'a dyn Observer,
 }
 
 /// What a protocol found.

@@ -1,7 +1,7 @@
 //! `paper`: every protocol, with published numbers beside ours.
 //!
-//! The article's scores of reconstruction are built in, for models of its kind and sizes; the rest comes from a file of
-//! the user's, see [`Published`]. Where there is none, the cell says "not at hand".
+//! The paper's scores of reconstruction are built in, for models of its kind and sizes; the rest comes from a file of
+//! the user's, see [`Published`]. Where there is none, the cell says "not available".
 
 use super::published::Published;
 use super::{
@@ -30,7 +30,7 @@ pub fn run(run: &Evaluation<'_>, published: &Published) -> Result<Report> {
         add(&mut report, protocol(run)?, published)?;
     }
     if let Some(first) = report.tables.first_mut() {
-        first.note("Published numbers are of the articles' test panoramas, not of these.");
+        first.note("Published numbers are those of the papers' test panoramas, not of these.");
     }
     let mut sizes: Vec<_> = run.subjects.iter().map(super::LoadedModel::training_panoramas).collect();
     let all_known = sizes.iter().all(Option::is_some);

@@ -1,4 +1,4 @@
-//! Numbers of the articles, to stand beside ours.
+//! Published numbers of the papers, to compare with.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +17,7 @@ const VENI_LDR_PSNR: [(usize, [f64; 2]); 3] =
 /// Largest file of published numbers that is read.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Numbers from the article: JSON `{table: {row: {column: number}}}`. A row is named as in our table: by the system, and
+/// Numbers from the paper: JSON `{table: {row: {column: number}}}`. A row is named as in our table: by the system, and
 /// in reconstruction by "system, pass".
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(transparent)]
@@ -27,7 +27,7 @@ impl Published {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be read, [`Error::Invalid`] by name if it is no such JSON.
+    /// [`Error::Io`] if it cannot be read, [`Error::Invalid`] by name if it is not such JSON.
     pub fn load(path: &Path) -> Result<Self> {
         let size = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len();
         if size > MAX_BYTES {
@@ -40,7 +40,7 @@ impl Published {
         })
     }
 
-    /// Together with what the articles say of systems like these, where the file says nothing else.
+    /// Together with what the papers say of systems like these, where the file says nothing else.
     #[must_use]
     pub fn with_article(mut self, subjects: &[LoadedModel]) -> Self {
         for subject in subjects {
@@ -80,7 +80,7 @@ impl Published {
                     let value = published.get(&name).and_then(|row| row.get(&column.title));
                     cells.push(match value {
                         Some(value) => Cell::Number(*value, 3),
-                        None => Cell::missing("not at hand"),
+                        None => Cell::missing("not available"),
                     });
                 }
             }
@@ -149,7 +149,7 @@ mod tests {
         let wide = numbers.beside(&table()).unwrap();
         assert_eq!(wide.columns.len(), 5);
         assert_eq!(wide.columns[3].title, "PSNR, published");
-        assert_eq!(wide.rows[0][3], Cell::missing("not at hand"));
+        assert_eq!(wide.rows[0][3], Cell::missing("not available"));
         assert_eq!(wide.rows[1][3], Cell::Number(21.5, 3));
         assert_eq!(wide.rows[1][4], Cell::Number(2.0, 1));
     }

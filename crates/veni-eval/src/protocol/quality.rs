@@ -33,7 +33,7 @@ pub(super) const COLUMNS: [&str; 9] = [
 ];
 
 /// How the columns are to be read.
-pub(super) const NOTE: &str = "PSNR in dB, mean over panoramas. (ref.): the authors' definition, one factor on log radiance as \
+pub(super) const NOTE: &str = "PSNR in dB, mean over panoramas. (ref.): the reference implementation's definition, one factor on log radiance as \
      stored; (exp.): one exposure factor on radiance. LDR is sRGB after division by each image's 98 % quantile; LPIPS \
      (AlexNet) compares LDR values, lower is better. Sun: angle between the brightest lights, over the panoramas that show a sun.";
 

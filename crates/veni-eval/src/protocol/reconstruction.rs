@@ -1,4 +1,4 @@
-//! `reconstruction`: how much of a panorama survives D numbers.
+//! `reconstruction`: how much of a panorama survives a latent of dimension D.
 //!
 //! Each panorama is coded by each codec (a model's autoencoder pass: the posterior's mean; its optimised pass: a latent
 //! fitted from there; the bases given beside), decoded, and scored under both definitions of the metrics.

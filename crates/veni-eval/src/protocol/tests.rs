@@ -50,7 +50,7 @@ fn skies(count: usize) -> Dataset {
 #[derive(Default)]
 struct Log(Mutex<Vec<(String, usize, usize)>>, Mutex<usize>);
 
-impl Watch for Log {
+impl Observer for Log {
     fn begin(&self, _: &'static str, task: &str, done: usize, total: usize) {
         self.0.lock().unwrap().push((task.to_owned(), done, total));
     }
@@ -69,7 +69,7 @@ fn evaluated<T>(
     protocol: impl Fn(&Evaluation<'_>) -> T,
 ) -> (T, usize) {
     let (log, store, figures) = (Log::default(), Store::new(folder), folder.join("figures"));
-    let (subjects, watch) = (subjects, &log);
+    let (subjects, observer) = (subjects, &log);
     let run = Evaluation {
         subjects,
         others: &[&Exact],
@@ -78,7 +78,7 @@ fn evaluated<T>(
         settings,
         store: &store,
         figures: &figures,
-        watch,
+        observer,
     };
     let result = protocol(&run);
     let computed = *log.1.lock().unwrap();
@@ -287,7 +287,7 @@ fn the_paper_is_all_of_it() {
     ];
     assert_eq!(names, expected);
     let cell = report.tables[0].cell("two", "LDR PSNR (ref.), published");
-    assert_eq!(cell, Some(&Cell::missing("not at hand")));
+    assert_eq!(cell, Some(&Cell::missing("not available")));
     let ablation = &report.tables[5];
     assert_eq!(
         ablation.cell("one", "LDR PSNR, autoencoder (ref.)").and_then(Cell::number),

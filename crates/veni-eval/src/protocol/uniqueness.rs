@@ -103,7 +103,7 @@ pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
     run.subjects.iter().try_for_each(|subject| pairs(run, subject).keep(run, share))
 }
 
-/// The authors' rates for the two kinds of models.
+/// The reference implementation's rates for the two kinds of models.
 fn fit(run: &Evaluation<'_>, subject: &LoadedModel) -> FitSettings {
     let rates = match subject.kind() {
         ModelKind::Veni => [1e-2, 2e-3],

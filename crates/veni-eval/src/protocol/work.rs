@@ -46,12 +46,12 @@ impl<'a, T: Serialize + DeserializeOwned + Send> Work<'a, T> {
         let get = |index: &usize| run.store.get::<T>(&self.keys[*index]);
         let mut values = chosen.iter().map(get).collect::<Result<Vec<_>>>()?;
         let missing: Vec<usize> = (0..chosen.len()).filter(|at| values[*at].is_none()).collect();
-        run.watch.begin(self.unit, &self.task, chosen.len() - missing.len(), chosen.len());
+        run.observer.begin(self.unit, &self.task, chosen.len() - missing.len(), chosen.len());
         let computed = parallel(missing.len(), |at| {
             let index = chosen[missing[at]];
             let value = (self.compute)(index)?;
             run.store.put(&self.keys[index], &value)?;
-            run.watch.advance(1);
+            run.observer.advance(1);
             Ok(value)
         })?;
         for (at, value) in missing.into_iter().zip(computed) {

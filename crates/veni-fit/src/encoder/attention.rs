@@ -2,9 +2,9 @@
 
 use super::linear::{Feature, Linear, Prepared};
 use super::matrix::{Matrix, PANEL, PackedRows, Product, Rows, padded};
-use super::room::grown;
 use super::softmax::Softmax;
 use super::weights::{Shape, Tensors};
+use super::workspace::grown;
 
 /// Looking tokens at a time: bounds the logits in memory.
 const BLOCK: usize = 96;
@@ -23,9 +23,9 @@ pub(super) struct Attention {
     coordinates: usize,
 }
 
-/// Room for one head.
+/// Workspace for one head.
 #[derive(Debug, Default)]
-pub(super) struct Room {
+pub(super) struct Workspace {
     rows: Vec<f32>,
     packed: PackedRows,
     keys: Matrix,
@@ -56,11 +56,18 @@ impl Attention {
 
     /// What head `h` sees: `[looking token, seen_width]` from `[looking token, coordinate, inner]` and
     /// `[token, coordinate, 2 · inner]`.
-    pub(super) fn look(&self, h: usize, query: &[f32], key_value: &[f32], seen: &mut [f32], room: &mut Room) {
+    pub(super) fn look(
+        &self,
+        h: usize,
+        query: &[f32],
+        key_value: &[f32],
+        seen: &mut [f32],
+        workspace: &mut Workspace,
+    ) {
         let (coordinates, head, inner) = (self.coordinates, self.head, self.query.width());
         let tokens = key_value.len() / (2 * inner * coordinates);
         let width = coordinates * head;
-        let (keys, values) = (&mut room.keys, &mut room.values);
+        let (keys, values) = (&mut workspace.keys, &mut workspace.values);
         keys.reset(width, tokens);
         values.reset(tokens, width);
         for (s, token) in key_value.chunks_exact(2 * inner * coordinates).enumerate() {
@@ -72,30 +79,36 @@ impl Attention {
         let queries = query.chunks(BLOCK * inner * coordinates);
         for (query, seen) in queries.zip(seen.chunks_mut(BLOCK * self.seen_width())) {
             let count = query.len() / (inner * coordinates);
-            room.rows.clear();
+            workspace.rows.clear();
             for channels in query.chunks_exact(inner) {
-                room.rows.extend_from_slice(&channels[h * head..][..head]);
+                workspace.rows.extend_from_slice(&channels[h * head..][..head]);
             }
-            room.packed.pack(Rows { data: &room.rows, stride: width, count }, width);
+            workspace.packed.pack(Rows { data: &workspace.rows, stride: width, count }, width);
             let stride = keys.outputs();
-            let logits = grown(&mut room.logits, count * stride);
-            let (x, panels) = (&room.packed, 0..keys.panels());
+            let logits = grown(&mut workspace.logits, count * stride);
+            let (x, panels) = (&workspace.packed, 0..keys.panels());
             Product { x, weight: keys, panels, y: logits, stride, add: false }.run();
             Softmax { rows: logits, stride, count: tokens }.run();
-            room.packed.pack(Rows { data: logits, stride, count }, tokens);
-            let (x, panels, stride) = (&room.packed, 0..values.panels(), self.seen_width());
+            workspace.packed.pack(Rows { data: logits, stride, count }, tokens);
+            let (x, panels, stride) = (&workspace.packed, 0..values.panels(), self.seen_width());
             Product { x, weight: values, panels, y: seen, stride, add: false }.run();
         }
     }
 
     /// The map out of the heads for looking tokens from `first` on. `seen` is `[head, looking token, seen_width]`,
     /// `y` `[token, coordinate, width]`.
-    pub(super) fn gather(&self, seen: &[f32], first: usize, y: &mut [f32], room: &mut (Vec<f32>, Prepared)) {
+    pub(super) fn gather(
+        &self,
+        seen: &[f32],
+        first: usize,
+        y: &mut [f32],
+        workspace: &mut (Vec<f32>, Prepared),
+    ) {
         let (coordinates, head, width) = (self.coordinates, self.head, self.seen_width());
         let channels = self.heads * head;
         let inner = channels.next_multiple_of(PANEL);
         let count = y.len() / (coordinates * self.out.width());
-        let (rows, prepared) = room;
+        let (rows, prepared) = workspace;
         let rows = grown(rows, count * coordinates * inner);
         for (h, seen) in seen.chunks_exact(seen.len() / self.heads).enumerate() {
             let seen = seen[first * width..].chunks_exact(width);

@@ -8,8 +8,8 @@ use veni_light::model::{VectorLayer, VnReluForm};
 use super::gate::{Gate, Place};
 use super::linear::{Feature, Linear, Prepared, So2};
 use super::matrix::{PANEL, Product};
-use super::room::grown;
 use super::weights::{Shape, Tensors};
+use super::workspace::grown;
 
 /// Panels of q and k at a time, so that both stay in the second-level cache.
 const PANELS: usize = 4;
@@ -25,9 +25,9 @@ pub(super) struct FeedForward {
     hidden: usize,
 }
 
-/// Room for a block of tokens.
+/// Workspace for a block of tokens.
 #[derive(Debug, Default)]
-pub(super) struct Room {
+pub(super) struct Workspace {
     prepared: Prepared,
     products: Vec<f32>,
     hidden: Vec<f32>,
@@ -61,28 +61,28 @@ impl FeedForward {
     }
 
     /// Applies the block to a feature; `y` is of its size.
-    pub(super) fn apply(&self, x: Feature<'_>, y: &mut [f32], room: &mut Room) {
+    pub(super) fn apply(&self, x: Feature<'_>, y: &mut [f32], workspace: &mut Workspace) {
         let (tokens, coordinates) = (x.tokens(), x.coordinates);
         let layer = self.contract.layer();
-        room.prepared.prepare(layer, x);
+        workspace.prepared.prepare(layer, x);
         let width = self.gate.weights.outputs() / 2;
         let stride = coordinates * width;
-        let hidden = grown(&mut room.hidden, tokens * stride);
+        let hidden = grown(&mut workspace.hidden, tokens * stride);
         let gated = if layer == VectorLayer::So2 { 2 } else { coordinates };
         let all = width / PANEL;
         for from in (0..all).step_by(PANELS) {
             let count = PANELS.min(all - from);
             let row = 2 * count * PANEL;
-            let products = grown(&mut room.products, tokens * gated * row);
+            let products = grown(&mut workspace.products, tokens * gated * row);
             let weight = &self.gate.weights;
             let panels = || 2 * from..2 * (from + count);
             match layer {
                 VectorLayer::Vn => {
-                    let x = &room.prepared.first;
+                    let x = &workspace.prepared.first;
                     Product { x, weight, panels: panels(), y: products, stride: row, add: false }.run();
                 }
                 VectorLayer::So2 => {
-                    let axes = [&room.prepared.first, &room.prepared.second];
+                    let axes = [&workspace.prepared.first, &workspace.prepared.second];
                     for (axis, x) in axes.into_iter().enumerate() {
                         let y = &mut products[axis * row..];
                         Product { x, weight, panels: panels(), y, stride: 2 * row, add: false }.run();
@@ -93,13 +93,13 @@ impl FeedForward {
             self.gate.apply(products, gated, hidden, place);
         }
         if let Some(so2) = &self.invariant {
-            so2.apply_invariant(&room.prepared, &mut hidden[2 * width..], stride);
+            so2.apply_invariant(&workspace.prepared, &mut hidden[2 * width..], stride);
             for token in hidden.chunks_exact_mut(stride) {
                 token[2 * width..].iter_mut().for_each(|v| *v = v.max(0.0));
             }
         }
         let hidden = Feature { data: hidden, coordinates, channels: self.hidden, width };
-        room.prepared.prepare(layer, hidden);
-        self.contract.apply(&room.prepared, y);
+        workspace.prepared.prepare(layer, hidden);
+        self.contract.apply(&workspace.prepared, y);
     }
 }

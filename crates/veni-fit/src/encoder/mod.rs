@@ -23,13 +23,13 @@ mod matrix;
 mod norm;
 mod parallel;
 mod posterior;
-mod room;
 mod simd;
 mod so2;
 mod softmax;
 mod tokens;
 mod transformer;
 mod weights;
+mod workspace;
 
 use veni_light::model::{EncoderConfig, Model, Pooling};
 use veni_light::sphere::{Equirect, Stripes};
@@ -39,10 +39,10 @@ use layout::Layout;
 use matrix::padded;
 use parallel::for_each;
 use posterior::ProjectOut;
-use room::Pool;
 use tokens::ProjectIn;
 use transformer::{Buffers, Transformer};
 use weights::{Shapes, Tensors};
+use workspace::Pool;
 
 pub use weights::encoder_schema;
 
@@ -61,7 +61,7 @@ pub struct Encoder {
     transformer: Transformer,
     project_out: ProjectOut,
     layout: Layout,
-    rooms: Pool<tokens::Room>,
+    workspaces: Pool<tokens::Workspace>,
     buffers: Pool<Buffers>,
 }
 
@@ -105,7 +105,7 @@ impl Encoder {
             transformer,
             project_out: ProjectOut::new(tensors, shapes.project_out, config.variational),
             layout: Layout::default(),
-            rooms: Pool::default(),
+            workspaces: Pool::default(),
             buffers: Pool::default(),
         })
     }
@@ -139,7 +139,7 @@ impl Encoder {
         if let Some(image) = images.iter().find(|image| image.len() != 3 * grid.len()) {
             let (Equirect { width, height }, count) = (grid, image.len());
             return Err(Error::invalid(format!(
-                "{count} values are no panorama of {width} × {height} in RGB"
+                "{count} values are not a panorama of {width} × {height} in RGB"
             )));
         }
         let directions = self.layout.directions(self)?;
@@ -209,7 +209,9 @@ impl Encoder {
             let tasks = x[first..].chunks_mut(share * token);
             let tasks = tasks.zip(directions.chunks(share * each)).zip(samples.chunks(share * each));
             for_each(workers, tasks.collect(), |((x, directions), samples)| {
-                self.rooms.with(|room| self.project_in.add(directions, samples, self.coordinates, x, room));
+                self.workspaces.with(|workspace| {
+                    self.project_in.add(directions, samples, self.coordinates, x, workspace);
+                });
             });
             self.transformer.run(buffers, self.cls.is_some(), workers);
             let x = &mut buffers.x;

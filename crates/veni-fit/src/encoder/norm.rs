@@ -18,7 +18,7 @@ pub(super) struct AddNormalised<'a> {
     pub(super) gamma: &'a [f32],
     pub(super) channels: usize,
     pub(super) coordinates: usize,
-    /// Room.
+    /// Workspace.
     pub(super) lengths: &'a mut Vec<f32>,
 }
 

@@ -29,9 +29,9 @@ enum Weights {
     },
 }
 
-/// Room for a block of tokens.
+/// Workspace for a block of tokens.
 #[derive(Debug, Default)]
-pub(super) struct Room {
+pub(super) struct Workspace {
     terms: Vec<f32>,
     packed: PackedRows,
 }
@@ -55,12 +55,12 @@ impl ProjectIn {
     /// `coordinates`.
     pub(super) fn fold(&self, directions: &[[f32; 3]], coordinates: usize) -> Vec<f32> {
         let tokens = directions.len() / self.samples;
-        let mut room = Room::default();
+        let mut workspace = Workspace::default();
         match &self.weights {
             Weights::Vn(weight) => {
                 let mut out = vec![0.0; tokens * coordinates * weight.outputs()];
                 for axis in 0..LATENT_COORDINATES {
-                    self.columns(directions, axis, weight, coordinates, axis, &mut out, &mut room);
+                    self.columns(directions, axis, weight, coordinates, axis, &mut out, &mut workspace);
                 }
                 out
             }
@@ -69,17 +69,19 @@ impl ProjectIn {
                 let inputs = 2 * self.samples;
                 let mut prepared = Prepared::default();
                 for (axis, packed) in [&mut prepared.first, &mut prepared.second].into_iter().enumerate() {
-                    room.terms(directions, self.samples, |d, out| {
+                    workspace.terms(directions, self.samples, |d, out| {
                         out.extend(d.iter().map(|d| d[axis]));
                         out.extend(d.iter().map(|d| d[2] * d[axis]));
                     });
-                    packed.pack(Rows { data: &room.terms, stride: inputs, count: tokens }, inputs);
+                    packed.pack(Rows { data: &workspace.terms, stride: inputs, count: tokens }, inputs);
                 }
-                room.terms(directions, self.samples, |d, out| {
+                workspace.terms(directions, self.samples, |d, out| {
                     out.extend(d.iter().map(|d| d[2]));
                     out.extend(d.iter().map(|d| (d[0] * d[0] + d[1] * d[1]).sqrt()));
                 });
-                prepared.invariant.pack(Rows { data: &room.terms, stride: inputs, count: tokens }, inputs);
+                prepared
+                    .invariant
+                    .pack(Rows { data: &workspace.terms, stride: inputs, count: tokens }, inputs);
                 so2.apply(&prepared, &mut out);
                 out
             }
@@ -93,13 +95,13 @@ impl ProjectIn {
         colours: &[[f32; 3]],
         coordinates: usize,
         y: &mut [f32],
-        room: &mut Room,
+        workspace: &mut Workspace,
     ) {
         match &self.weights {
             Weights::Vn(weight) => {
                 for colour in 0..SAMPLE_COORDINATES - LATENT_COORDINATES {
                     let coordinate = LATENT_COORDINATES + colour;
-                    self.columns(colours, colour, weight, coordinates, coordinate, y, room);
+                    self.columns(colours, colour, weight, coordinates, coordinate, y, workspace);
                 }
             }
             Weights::So2 { colours: so2, .. } => {
@@ -107,24 +109,24 @@ impl ProjectIn {
                 let (width, inputs) = (weight.outputs(), 3 * self.samples);
                 let stride = coordinates * width;
                 for axis in 0..2 {
-                    room.terms.clear();
+                    workspace.terms.clear();
                     let stripes = colours.chunks_exact(self.samples);
                     for (colours, d) in stripes.zip(directions.chunks_exact(self.samples)) {
                         for k in 0..3 {
-                            room.terms.extend(colours.iter().zip(d).map(|(c, d)| c[k] * d[axis]));
+                            workspace.terms.extend(colours.iter().zip(d).map(|(c, d)| c[k] * d[axis]));
                         }
                     }
-                    room.packed.pack(Rows { data: &room.terms, stride: inputs, count }, inputs);
-                    let (x, panels, y) = (&room.packed, 0..weight.panels(), &mut y[axis * width..]);
+                    workspace.packed.pack(Rows { data: &workspace.terms, stride: inputs, count }, inputs);
+                    let (x, panels, y) = (&workspace.packed, 0..weight.panels(), &mut y[axis * width..]);
                     Product { x, weight, panels, y, stride, add: true }.run();
                 }
-                room.terms(colours, self.samples, |colours, out| {
+                workspace.terms(colours, self.samples, |colours, out| {
                     for k in 0..3 {
                         out.extend(colours.iter().map(|c| c[k]));
                     }
                 });
-                room.packed.pack(Rows { data: &room.terms, stride: inputs, count }, inputs);
-                let (x, weight, y) = (&room.packed, &so2.invariant, &mut y[2 * width..]);
+                workspace.packed.pack(Rows { data: &workspace.terms, stride: inputs, count }, inputs);
+                let (x, weight, y) = (&workspace.packed, &so2.invariant, &mut y[2 * width..]);
                 Product { x, weight, panels: 0..weight.panels(), y, stride, add: true }.run();
             }
         }
@@ -140,17 +142,17 @@ impl ProjectIn {
         coordinates: usize,
         to: usize,
         y: &mut [f32],
-        room: &mut Room,
+        workspace: &mut Workspace,
     ) {
         let (count, width) = (samples.len() / self.samples, weight.outputs());
-        room.terms(samples, self.samples, |samples, out| out.extend(samples.iter().map(|s| s[from])));
-        room.packed.pack(Rows { data: &room.terms, stride: self.samples, count }, self.samples);
-        let (x, panels, y) = (&room.packed, 0..weight.panels(), &mut y[to * width..]);
+        workspace.terms(samples, self.samples, |samples, out| out.extend(samples.iter().map(|s| s[from])));
+        workspace.packed.pack(Rows { data: &workspace.terms, stride: self.samples, count }, self.samples);
+        let (x, panels, y) = (&workspace.packed, 0..weight.panels(), &mut y[to * width..]);
         Product { x, weight, panels, y, stride: coordinates * width, add: false }.run();
     }
 }
 
-impl Room {
+impl Workspace {
     /// Fills `terms` stripe by stripe.
     fn terms(&mut self, samples: &[[f32; 3]], each: usize, row: impl Fn(&[[f32; 3]], &mut Vec<f32>)) {
         self.terms.clear();

@@ -8,8 +8,8 @@ use super::linear::{Feature, Prepared};
 use super::matrix::padded;
 use super::norm::AddNormalised;
 use super::parallel::for_each;
-use super::room::{Pool, grown};
 use super::weights::{Shapes, Tensors};
+use super::workspace::{Pool, grown};
 
 /// Most tokens of one task: what they need stays in the second-level cache.
 const TOKENS: usize = 33;
@@ -30,17 +30,17 @@ pub(super) struct Transformer {
     blocks: Vec<Block>,
     channels: usize,
     coordinates: usize,
-    rooms: Pool<Room>,
-    heads: Pool<attention::Room>,
+    workspaces: Pool<Workspace>,
+    heads: Pool<attention::Workspace>,
 }
 
-/// Room for a block of tokens.
+/// Workspace for a block of tokens.
 #[derive(Debug, Default)]
-struct Room {
+struct Workspace {
     gathered: (Vec<f32>, Prepared),
     branch: Vec<f32>,
     lengths: Vec<f32>,
-    feed_forward: feed_forward::Room,
+    feed_forward: feed_forward::Workspace,
 }
 
 /// What the tokens of an image need between blocks.
@@ -76,7 +76,7 @@ impl Transformer {
             blocks: (0..config.depth).map(block).collect(),
             channels: config.channels,
             coordinates: shapes.inner,
-            rooms: Pool::default(),
+            workspaces: Pool::default(),
             heads: Pool::default(),
         }
     }
@@ -100,7 +100,7 @@ impl Transformer {
         let share = share(looking, workers);
         let tasks = x[..looking * self.token()].chunks_mut(share * self.token()).enumerate();
         for_each(workers, tasks.collect(), |(t, x)| {
-            self.rooms.with(|room| self.finish(self.blocks.last(), seen, t * share, x, room));
+            self.workspaces.with(|workspace| self.finish(self.blocks.last(), seen, t * share, x, workspace));
         });
     }
 
@@ -117,9 +117,9 @@ impl Transformer {
         let key_values = grown(key_value, tokens * 2 * inner).chunks_mut(share * 2 * inner);
         let tasks = x.chunks_mut(share * self.token()).zip(queries.chunks_mut(share * inner)).zip(key_values);
         for_each(workers, tasks.enumerate().collect(), |(t, ((x, query), key_value))| {
-            self.rooms.with(|room| {
-                self.finish(before, seen, t * share, x, room);
-                let prepared = &mut room.gathered.1;
+            self.workspaces.with(|workspace| {
+                self.finish(before, seen, t * share, x, workspace);
+                let prepared = &mut workspace.gathered.1;
                 prepared.prepare(layer, self.feature(x));
                 attention.key_value.apply(prepared, key_value);
                 if looking == tokens {
@@ -128,8 +128,8 @@ impl Transformer {
             });
         });
         if looking < tokens {
-            self.rooms.with(|room| {
-                let prepared = &mut room.gathered.1;
+            self.workspaces.with(|workspace| {
+                let prepared = &mut workspace.gathered.1;
                 prepared.prepare(layer, self.feature(&x[..looking * self.token()]));
                 attention.query.apply(prepared, &mut queries[..looking * inner]);
             });
@@ -146,19 +146,26 @@ impl Transformer {
         seen.resize(attention.heads * looking * attention.seen_width(), 0.0);
         let heads = seen.chunks_mut(looking * attention.seen_width()).enumerate();
         for_each(workers, heads.collect(), |(h, seen)| {
-            self.heads.with(|room| attention.look(h, query, key_value, seen, room));
+            self.heads.with(|workspace| attention.look(h, query, key_value, seen, workspace));
         });
     }
 
     /// What follows the heads in a block, for the tokens `x`, the first of which is token `first`.
-    fn finish(&self, block: Option<&Block>, seen: &[f32], first: usize, x: &mut [f32], room: &mut Room) {
+    fn finish(
+        &self,
+        block: Option<&Block>,
+        seen: &[f32],
+        first: usize,
+        x: &mut [f32],
+        workspace: &mut Workspace,
+    ) {
         let Some(Block { attention, norm1, feed_forward, norm2 }) = block else { return };
         let (channels, coordinates) = (self.channels, self.coordinates);
-        let Room { gathered, branch, lengths, feed_forward: room } = room;
+        let Workspace { gathered, branch, lengths, feed_forward: workspace } = workspace;
         let y = grown(branch, x.len());
         attention.gather(seen, first, y, gathered);
         AddNormalised { x, y, gamma: norm1, channels, coordinates, lengths }.run();
-        feed_forward.apply(self.feature(x), y, room);
+        feed_forward.apply(self.feature(x), y, workspace);
         AddNormalised { x, y, gamma: norm2, channels, coordinates, lengths }.run();
     }
 

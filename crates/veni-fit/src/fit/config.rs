@@ -17,7 +17,7 @@ pub struct FitConfig {
     pub method: Method,
     /// Learning rate of Adam over the updates, from step 0.
     pub learning_rate: LearningRate,
-    /// Adam's ε. The authors' 1e-15 makes every coordinate move by the full rate at first.
+    /// Adam's ε. The reference implementation's 1e-15 makes every coordinate move by the full rate at first.
     pub epsilon: f64,
     /// What is compared.
     pub objective: Objective,
@@ -96,7 +96,7 @@ pub enum Objective {
     /// (1 − `share`) · [`Objective::LogError`] + `share` · Σ ω m (L/L̄) ρ(P − I)/Σ ω m, L being a pixel's luminance, L̄ its
     /// mean over ω m, and ρ(e) = 2 (√(1 + e²) − 1): a pixel counts by its area and a little by the light that comes from
     /// it, where ρ (e² for small e, a line for large ones) keeps a sun that the decoder cannot follow from dragging the
-    /// rest along. For light that shall fall on something: a sun is a thousandth of the sphere and half of its light.
+    /// rest along. For light that is to illuminate something: a sun is a thousandth of the sphere and half of its light.
     Energy {
         /// Part of the weight that goes by light, in [0, 1].
         share: f64,
@@ -149,12 +149,12 @@ impl FitConfig {
         Self { objective: Objective::Energy { share: SHARE }, ..Self::thorough() }
     }
 
-    /// For the light on a surface ([`fit_shaded`](super::fit_shaded)), whose loss is no sum over the light's pixels.
+    /// For the light on a surface ([`fit_shaded`](super::fit_shaded)), whose loss is not a sum over the light's pixels.
     pub fn light() -> Self {
         Self { method: Method::Adam, learning_rate: exponential(5e-2, 2e-3, 400), ..Self::thorough() }
     }
 
-    /// The authors' helper (figures, uniqueness): `steps` steps from `rate` to `last`.
+    /// The reference implementation's helper (figures, uniqueness): `steps` steps from `rate` to `last`.
     pub fn reference_helper(rate: f64, last: f64, steps: u64) -> Self {
         Self {
             steps,

@@ -2,7 +2,7 @@
 
 use super::FitResult;
 use super::config::{FitConfig, Method};
-use super::levenberg_marquardt::{Search, Slopes};
+use super::levenberg_marquardt::{QuadraticModel, Search};
 use super::network::{Evaluation, ImageLoss, Network};
 use super::pixel::PixelLoss;
 use super::plateau::PlateauDetector;
@@ -16,7 +16,7 @@ pub(super) fn optimise(
     prior: Option<&Prior>,
     start: &[Latent],
     config: &FitConfig,
-    watch: &mut dyn FnMut(u64, f64),
+    observer: &mut dyn FnMut(u64, f64),
 ) -> Result<FitResult> {
     let n = start.first().map_or(0, |z| z.vectors.len());
     let standard = Prior::standard(n);
@@ -28,7 +28,7 @@ pub(super) fn optimise(
     };
     let [explore, finish] = config.plan(n, pixels.is_some());
     let descent = Descent { network, loss, penalty: &penalty, config };
-    let mut trace = Trace { losses: Vec::new(), watch };
+    let mut trace = Trace { losses: Vec::new(), observer };
     let mut latents = start.to_vec();
     if explore > 0 {
         latents = descent.adam(&latents, explore, &mut trace)?;
@@ -56,13 +56,13 @@ struct Penalty<'a> {
 }
 
 impl Penalty<'_> {
-    /// Its value and slopes.
+    /// Its value and gradient.
     fn at(&self, vectors: &[[f32; 3]]) -> (f64, Vec<f64>) {
         if self.scale == 0.0 {
             return (0.0, vec![0.0; 3 * vectors.len()]);
         }
-        let (energy, slopes) = self.prior.energy(vectors);
-        (self.scale * energy, slopes.as_flattened().iter().map(|s| self.scale * s).collect())
+        let (energy, gradient) = self.prior.energy(vectors);
+        (self.scale * energy, gradient.as_flattened().iter().map(|s| self.scale * s).collect())
     }
 
     /// Its second derivatives, [3N, 3N]: the same everywhere, since it is a quadratic.
@@ -79,14 +79,14 @@ impl Penalty<'_> {
         rows
     }
 
-    /// Added to the losses and slopes of all images.
+    /// Added to the losses and gradients of all images.
     fn add_to(&self, vectors: &[f32], found: &mut Evaluation) {
         let count = 3 * self.prior.latent_vectors();
         let each = vectors.chunks_exact(count).zip(&mut found.losses);
-        for ((z, loss), slopes) in each.zip(found.gradient.vectors.chunks_exact_mut(count)) {
+        for ((z, loss), gradient) in each.zip(found.gradient.vectors.chunks_exact_mut(count)) {
             let (value, by) = self.at(z.as_chunks().0);
             *loss += value;
-            slopes.iter_mut().zip(by).for_each(|(slope, by)| *slope += by);
+            gradient.iter_mut().zip(by).for_each(|(g, by)| *g += by);
         }
     }
 }
@@ -99,10 +99,10 @@ struct Descent<'a> {
     config: &'a FitConfig,
 }
 
-/// The losses so far, and who is told of them.
+/// The losses so far, and the callback that gets them.
 struct Trace<'a> {
     losses: Vec<f64>,
-    watch: &'a mut dyn FnMut(u64, f64),
+    observer: &'a mut dyn FnMut(u64, f64),
 }
 
 impl Trace<'_> {
@@ -115,7 +115,7 @@ impl Trace<'_> {
                 "the fit's loss is {value} at step {step}; lower its learning rate, or start elsewhere"
             )));
         }
-        (self.watch)(step, value);
+        (self.observer)(step, value);
         self.losses.push(value);
         Ok(())
     }
@@ -163,10 +163,10 @@ impl Descent<'_> {
         trace: &mut Trace<'_>,
     ) -> Result<Vec<Latent>> {
         let (curvature, free) = (self.penalty.curvature(), self.config.free_exposure);
-        let evaluate = |latent: &Latent, image: &PixelLoss<'_>| -> Result<Slopes> {
+        let evaluate = |latent: &Latent, image: &PixelLoss<'_>| -> Result<QuadraticModel> {
             let found = self.network.equations(latent, image)?;
             let (value, by) = self.penalty.at(&latent.vectors);
-            Ok(Slopes::new(found, free).plus(value, &by, &curvature))
+            Ok(QuadraticModel::new(found, free).plus(value, &by, &curvature))
         };
         let begin = |(latent, image): (&Latent, &PixelLoss<'_>)| -> Result<Search> {
             Ok(Search::new(latent.clone(), evaluate(latent, image)?))

@@ -16,19 +16,19 @@ const DAMPING: f64 = 1e-2;
 const MOST_DAMPING: f64 = 1e8;
 /// Least diagonal element of D, in parts of the largest: coordinates that hardly matter stay where they are.
 const FLOOR: f64 = 1e-6;
-/// A fall of the loss by less than this fraction is no progress, and so many of them in a row end the search.
+/// A fall of the loss by less than this fraction is not progress, and N of them in a row end the search.
 const PROGRESS: f64 = 1e-4;
 const PATIENCE: u32 = 3;
 
-/// The loss at a latent, prior included, with what is needed for a step: over the coordinates that may move.
+/// The local quadratic of the loss at a latent, prior included: over the coordinates that may move.
 #[derive(Debug)]
-pub(super) struct Slopes {
+pub(super) struct QuadraticModel {
     value: f64,
     gradient: Vec<f64>,
     matrix: Vec<f64>,
 }
 
-impl Slopes {
+impl QuadraticModel {
     /// With the exposure as the last coordinate, if it is `free`.
     pub(super) fn new(equations: NormalEquations, free: bool) -> Self {
         let NormalEquations { loss: value, mut gradient, mut matrix } = equations;
@@ -41,10 +41,10 @@ impl Slopes {
     }
 
     /// With a penalty on the vectors' coordinates added.
-    pub(super) fn plus(mut self, value: f64, slopes: &[f64], curvature: &[f64]) -> Self {
-        let (n, m) = (self.gradient.len(), slopes.len());
+    pub(super) fn plus(mut self, value: f64, gradient: &[f64], curvature: &[f64]) -> Self {
+        let (n, m) = (self.gradient.len(), gradient.len());
         self.value += value;
-        self.gradient.iter_mut().zip(slopes).for_each(|(g, by)| *g += by);
+        self.gradient.iter_mut().zip(gradient).for_each(|(g, by)| *g += by);
         for (row, more) in self.matrix.chunks_exact_mut(n).zip(curvature.chunks_exact(m)) {
             row.iter_mut().zip(more).for_each(|(h, more)| *h += more);
         }
@@ -73,14 +73,14 @@ impl Slopes {
 #[derive(Debug)]
 pub(super) struct Search {
     latent: Latent,
-    at: Slopes,
+    at: QuadraticModel,
     damping: f64,
     growth: f64,
     idle: u32,
 }
 
 impl Search {
-    pub(super) fn new(latent: Latent, at: Slopes) -> Self {
+    pub(super) fn new(latent: Latent, at: QuadraticModel) -> Self {
         Self { latent, at, damping: DAMPING, growth: 2.0, idle: 0 }
     }
 
@@ -99,7 +99,7 @@ impl Search {
     }
 
     /// Tries a step, and takes it if the loss falls.
-    pub(super) fn step(&mut self, evaluate: impl FnOnce(&Latent) -> Result<Slopes>) -> Result<()> {
+    pub(super) fn step(&mut self, evaluate: impl FnOnce(&Latent) -> Result<QuadraticModel>) -> Result<()> {
         let trial = self.at.step(self.damping).map(|(step, fall)| (self.moved(&step), fall));
         let Some((trial, fall)) = trial.filter(|(trial, _)| is_valid(trial)) else {
             self.shorten();

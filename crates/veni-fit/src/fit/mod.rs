@@ -55,8 +55,8 @@ pub fn fit(
     fit_with(decoder, target, start, config, None, &mut |_, _| {})
 }
 
-/// [`fit`] with a loss over whole images, which [`FitConfig::objective`] names, and an observer, who is told the number of
-/// updates made and the loss, before each update.
+/// [`fit`] with a loss over whole images, which [`FitConfig::objective`] names, and a progress callback, which gets the
+/// number of updates made and the loss, before each update.
 ///
 /// # Errors
 /// As [`fit`].

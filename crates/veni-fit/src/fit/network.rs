@@ -1,6 +1,6 @@
 //! The losses at some latents, and their gradients: each kind of loss through each kind of decoder.
 
-use veni_light::field::{Curved, NormalEquations};
+use veni_light::field::{LocalQuadratic, NormalEquations};
 use veni_light::latent::Latent;
 
 use super::decoder::{DecoderPasses, FoldedPasses, LatentDecoder, LatentGradient, PanoramaLoss};
@@ -66,7 +66,7 @@ impl<'a> Network<'a> {
                 for (field, image) in passes.fields(latents)?.iter().zip(images) {
                     let found = field.gradient(&passes.directions, |i, p| {
                         let value = image.at(i, p.map(f64::from));
-                        (value.loss, value.slope.map(|s| s as f32))
+                        (value.loss, value.gradient.map(|s| s as f32))
                     });
                     losses.push(found.loss);
                     gradient.push(found);
@@ -104,8 +104,8 @@ impl<'a> Network<'a> {
         };
         let at = |i: usize, p: [f32; 3]| {
             let value = image.at(i, p.map(f64::from));
-            let [slope, curvature] = [value.slope, value.curvature].map(|v| v.map(|v| v as f32));
-            Curved { loss: value.loss, slope, curvature }
+            let [gradient, weight] = [value.gradient, value.curvature].map(|v| v.map(|v| v as f32));
+            LocalQuadratic { loss: value.loss, gradient, weight }
         };
         Ok(decoder.condition(latent)?.normal_equations(directions, at))
     }
@@ -137,7 +137,7 @@ fn pixel_losses(prediction: &[f64], images: &[PixelLoss<'_>]) -> (Vec<f64>, Vec<
             .enumerate()
             .map(|(i, p)| {
                 let value = image.at(i, *p);
-                gradient.extend(value.slope);
+                gradient.extend(value.gradient);
                 value.loss
             })
             .sum()

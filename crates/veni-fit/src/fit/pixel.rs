@@ -14,7 +14,7 @@ const REACH: f64 = 1.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PixelValue {
     pub(super) loss: f64,
-    pub(super) slope: [f64; 3],
+    pub(super) gradient: [f64; 3],
     /// Of the parabola that stands for the loss where a squared error would be one: at least 0.
     pub(super) curvature: [f64; 3],
 }
@@ -82,17 +82,17 @@ impl<'a> PixelLoss<'a> {
             if error > 0.0 && self.clipped.is_some_and(|clipped| clipped[k]) {
                 continue;
             }
-            let (value, slope, curvature) = match self.objective {
+            let (value, gradient, curvature) = match self.objective {
                 Objective::LogAbsolute => {
-                    // the parabola through the same value and slope that lies above it everywhere
+                    // the parabola through the same value and gradient that lies above it everywhere
                     let root = error.hypot(ROUNDING);
                     (root - ROUNDING, error / root, 1.0 / root)
                 }
                 Objective::Display { log } => {
                     let (shown, by) = tonemap::srgb_of_log(p - self.white);
                     let difference = shown - self.shown[k];
-                    let slope = 2.0 * difference * by + 2.0 * log * error;
-                    (difference * difference + log * error * error, slope, 2.0 * by * by + 2.0 * log)
+                    let gradient = 2.0 * difference * by + 2.0 * log * error;
+                    (difference * difference + log * error * error, gradient, 2.0 * by * by + 2.0 * log)
                 }
                 Objective::Energy { .. } => {
                     // e² where it is small, a line where it is not: see `Objective::Energy`
@@ -105,7 +105,7 @@ impl<'a> PixelLoss<'a> {
             };
             // the mean over the channels
             out.loss += weight / 3.0 * value;
-            out.slope[c] = weight / 3.0 * slope;
+            out.gradient[c] = weight / 3.0 * gradient;
             out.curvature[c] = weight / 3.0 * curvature;
         }
         out

@@ -9,7 +9,7 @@ use veni_light::latent::{Latent, Prior};
 /// Optimises one latent per image from `start`. Each image's loss is its own
 /// ([`ShadedLoss`](crate::shade::ShadedLoss)): [`FitConfig::objective`] is not looked at. All must have the same lights, those the
 /// decoder is asked for. A latent's log exposure is the number that the image's
-/// [`ExposureForm`](crate::shade::ExposureForm) takes. `watch` gets the number of updates made and the mean loss.
+/// [`ExposureForm`](crate::shade::ExposureForm) takes. `observer` gets the number of updates made and the mean loss.
 ///
 /// # Errors
 /// [`Error::Invalid`] if the numbers of images and starts or their sizes disagree, if there are none, if lights
@@ -20,7 +20,7 @@ pub fn fit_shaded(
     prior: Option<&Prior>,
     start: &[Latent],
     config: &FitConfig,
-    watch: &mut dyn FnMut(u64, f64),
+    observer: &mut dyn FnMut(u64, f64),
 ) -> Result<FitResult> {
     config.check()?;
     let n = decoder.latent_vectors();
@@ -32,7 +32,7 @@ pub fn fit_shaded(
         return Err(Error::invalid("images that are fitted together must be lit by the same lights"));
     }
     let network = Network::new(decoder, lights.directions().to_vec());
-    optimise(&network, &ImageLoss::Shaded(images), prior, start, config, watch)
+    optimise(&network, &ImageLoss::Shaded(images), prior, start, config, observer)
 }
 
 /// The log exposure at which the rendering of light `log_radiance` is as bright, on average, as the picture `target` (both in

@@ -28,7 +28,7 @@ pub fn random_starts(prior: &Prior, log_exposure: f32, count: usize, seed: u64) 
     (0..count).map(draw).collect()
 }
 
-/// Fits the single image of `target` from every start, and keeps the best. `watch` gets the number of updates
+/// Fits the single image of `target` from every start, and keeps the best. `observer` gets the number of updates
 /// made, all starts together, and the loss.
 ///
 /// # Errors
@@ -41,10 +41,12 @@ pub fn best_of(
     target: &FitTarget<'_>,
     starts: &[Latent],
     config: &FitConfig,
-    watch: &mut dyn FnMut(u64, f64),
+    observer: &mut dyn FnMut(u64, f64),
 ) -> Result<Best> {
     assert!(target.count() == 1, "one image");
-    from_each(starts, config, watch, |start, watch| fit_with(decoder, target, start, config, None, watch))
+    from_each(starts, config, observer, |start, observer| {
+        fit_with(decoder, target, start, config, None, observer)
+    })
 }
 
 /// [`best_of`] for the light on a surface: [`fit_shaded`] of one image from every start.
@@ -60,13 +62,15 @@ pub fn best_light(
     prior: Option<&Prior>,
     starts: &[Latent],
     config: &FitConfig,
-    watch: &mut dyn FnMut(u64, f64),
+    observer: &mut dyn FnMut(u64, f64),
 ) -> Result<Best> {
     let image = std::slice::from_ref(image);
-    from_each(starts, config, watch, |start, watch| fit_shaded(decoder, image, prior, start, config, watch))
+    from_each(starts, config, observer, |start, observer| {
+        fit_shaded(decoder, image, prior, start, config, observer)
+    })
 }
 
-/// The best of the fits that `fit` makes from each start; it is told the starts one by one, and an observer as [`fit_with`]'s.
+/// The best of the fits that `fit` makes from each start; it gets the starts one by one, and a callback as [`fit_with`]'s.
 ///
 /// # Errors
 /// Those of `fit`.
@@ -76,13 +80,13 @@ pub fn best_light(
 pub fn from_each(
     starts: &[Latent],
     config: &FitConfig,
-    watch: &mut dyn FnMut(u64, f64),
+    observer: &mut dyn FnMut(u64, f64),
     mut fit: impl FnMut(&[Latent], &mut dyn FnMut(u64, f64)) -> Result<FitResult>,
 ) -> Result<Best> {
     let (mut all, mut losses) = (Vec::new(), Vec::new());
     for (k, start) in starts.iter().enumerate() {
         let before = k as u64 * config.most_updates(start.vectors.len());
-        let found = fit(std::slice::from_ref(start), &mut |step, loss| watch(before + step, loss))?;
+        let found = fit(std::slice::from_ref(start), &mut |step, loss| observer(before + step, loss))?;
         all.extend(found.latents);
         losses.extend(found.last);
     }

@@ -29,7 +29,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The authors' camera: at the origin, looking along −z, x to the right, y up.
+    /// The reference implementation's camera: at the origin, looking along −z, x to the right, y up.
     pub fn reference() -> Self {
         Self {
             position: [0.0; 3],

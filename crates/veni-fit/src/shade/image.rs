@@ -10,12 +10,12 @@ pub enum ExposureForm {
     /// Radiance times e^s.
     #[default]
     Natural,
-    /// The authors' program exponentiates twice: radiance times exp(e^s), never below 1 (MODEL, Rendered images).
+    /// The reference implementation exponentiates twice: radiance times exp(e^s), never below 1 (MODEL, Rendered images).
     Reference,
 }
 
 impl ExposureForm {
-    /// What is added to log radiance, and its derivative by s.
+    /// What is added to log radiance, and its derivative with respect to s.
     fn offset(self, s: f32) -> (f32, f64) {
         match self {
             Self::Natural => (s, 1.0),
@@ -46,10 +46,10 @@ pub type Evaluation = (f64, Vec<[f32; 3]>, f64);
 ///
 /// let image = ShadedImage::new(transfer, &photograph, ShadedLoss::default())?;
 /// let log_radiance = vec![[0.0; 3]; grid.len()]; // a decoder's output
-/// let (loss, slope, exposure_slope) = image.evaluate(&log_radiance, 0.0);
+/// let (loss, gradient, by_exposure) = image.evaluate(&log_radiance, 0.0);
 /// // the light should be redder, which is to say: more of channel 0, less of channel 2
-/// assert!(loss > 0.0 && slope[0][0] < 0.0 && slope[0][2] > 0.0);
-/// # let _ = exposure_slope;
+/// assert!(loss > 0.0 && gradient[0][0] < 0.0 && gradient[0][2] > 0.0);
+/// # let _ = by_exposure;
 /// # Ok(()) }
 /// ```
 ///
@@ -106,10 +106,10 @@ impl ShadedImage {
         let (loss, mut gradient) =
             self.transfer.evaluate(&light, |at, value| self.comparison.pixel(at, value));
         let mut total = 0.0;
-        for (slope, radiance) in gradient.iter_mut().zip(&radiance) {
-            for (slope, radiance) in slope.iter_mut().zip(radiance) {
-                *slope *= radiance;
-                total += f64::from(*slope);
+        for (g, radiance) in gradient.iter_mut().zip(&radiance) {
+            for (g, radiance) in g.iter_mut().zip(radiance) {
+                *g *= radiance;
+                total += f64::from(*g);
             }
         }
         (loss, gradient, total * self.exposure.offset(log_exposure).1)

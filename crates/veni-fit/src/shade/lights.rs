@@ -32,7 +32,7 @@ impl Lights {
         });
         let directions = normalised.collect::<Result<_>>()?;
         if let Some(wrong) = solid_angles.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
-            return Err(Error::invalid(format!("{wrong} is no solid angle of a light: give 0 or more")));
+            return Err(Error::invalid(format!("{wrong} is not a solid angle of a light: give 0 or more")));
         }
         Ok(Self { directions, solid_angles: solid_angles.to_vec() })
     }
@@ -44,8 +44,8 @@ impl Lights {
         Self { directions: grid.directions(), solid_angles: solid_angles.collect() }
     }
 
-    /// The authors' lights: one per pixel of a panorama, row-major, each with weight 1 whatever its solid angle
-    /// (MODEL, Rendered images), in their camera frame ([`reference::decoder_directions`]).
+    /// The reference implementation's lights: one per pixel of a panorama, row-major, each with weight 1 whatever its
+    /// solid angle (MODEL, Rendered images), in their camera frame ([`reference::decoder_directions`]).
     pub fn reference(grid: Equirect) -> Self {
         Self { directions: reference::decoder_directions(grid), solid_angles: vec![1.0; grid.len()] }
     }

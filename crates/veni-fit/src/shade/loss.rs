@@ -18,7 +18,7 @@ pub enum ShadedLoss {
         /// ε over the mean of the target.
         floor: f32,
     },
-    /// The authors' figure (MODEL, Rendered images): 100 mean |ln R − ln T| over all pixels, where those that show nothing are
+    /// The reference implementation's figure (MODEL, Rendered images): 100 mean |ln R − ln T| over all pixels, where those that show nothing are
     /// equal.
     ReferenceLog,
     /// RENI++'s demonstration: `mse` mean (g(R) − g(T))² + `cosine` (1 − mean cos(g(R), g(T))) over all pixels, with g(x) the
@@ -125,7 +125,7 @@ impl Comparison {
         let (share, constant) = (self.share, f64::from(self.constant));
         let [r, t] = [value, target].map(|v| v.map(f64::from));
         let mut total = 0.0;
-        let slopes = match self.loss {
+        let gradient = match self.loss {
             ShadedLoss::RobustLog { delta, .. } => [0, 1, 2].map(|c| {
                 let (shifted, delta) = (r[c].max(0.0) + constant, f64::from(delta));
                 let x = (shifted / t[c]).ln();
@@ -139,12 +139,12 @@ impl Comparison {
                 if x == 0.0 { 0.0 } else { share * x.signum() / r[c] }
             }),
             ShadedLoss::ReferenceDisplay { mse, cosine } => {
-                let (parts, slopes) = display(r, t, constant);
+                let (parts, gradient) = display(r, t, constant);
                 total += share * (mse * parts[0] + cosine * parts[1]);
-                [0, 1, 2].map(|c| share * (mse * slopes[0][c] + cosine * slopes[1][c]))
+                [0, 1, 2].map(|c| share * (mse * gradient[0][c] + cosine * gradient[1][c]))
             }
         };
-        (total, slopes.map(|v| v as f32))
+        (total, gradient.map(|v| v as f32))
     }
 
     /// Mean (g(R) − g(T))² and 1 − mean cos(g(R), g(T)) of [`ShadedLoss::ReferenceDisplay`].
@@ -163,18 +163,18 @@ impl Comparison {
 fn display(r: [f64; 3], t: [f64; 3], white: f64) -> ([f64; 2], [[f64; 3]; 2]) {
     let shown = |v: [f64; 3]| v.map(|v| f64::from(srgb((v / white) as f32)));
     let (a, b) = (shown(r), shown(t));
-    let slope = r.map(|v| srgb_slope(v / white) / white);
+    let derivative = r.map(|v| srgb_slope(v / white) / white);
     let difference = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let square = dot(difference, difference) / 3.0;
-    let squares = [0, 1, 2].map(|c| 2.0 / 3.0 * difference[c] * slope[c]);
+    let squares = [0, 1, 2].map(|c| 2.0 / 3.0 * difference[c] * derivative[c]);
     let (aa, bb, ab) = (dot(a, a), dot(b, b), dot(a, b));
     let norms = (aa * bb).sqrt();
     // PyTorch's cosine similarity: the product of norms is at least 1e-8
     let (cosine, angle) = if norms > 1e-8 {
         let cosine = ab / norms;
-        (cosine, [0, 1, 2].map(|c| (cosine * a[c] / aa - b[c] / norms) * slope[c]))
+        (cosine, [0, 1, 2].map(|c| (cosine * a[c] / aa - b[c] / norms) * derivative[c]))
     } else {
-        (ab / 1e-8, [0, 1, 2].map(|c| -b[c] / 1e-8 * slope[c]))
+        (ab / 1e-8, [0, 1, 2].map(|c| -b[c] / 1e-8 * derivative[c]))
     };
     ([square, 1.0 - cosine], [squares, angle])
 }

@@ -34,7 +34,7 @@ impl NormalMap {
     /// per byte (32767.5 (n + 1) in 16 bits); black and transparent pixels of a PNG show nothing.
     ///
     /// # Errors
-    /// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is no such image.
+    /// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is not such an image.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let (size, normals) = if let Some((size, pixels)) = display(path)? {
@@ -65,8 +65,8 @@ impl NormalMap {
         (length > LENGTHS[0] && length < LENGTHS[1]).then(|| unit_f32(normal)).flatten()
     }
 
-    /// Each vector (x, y, z) becomes (x, −y, z): from maps whose green channel grows downwards (as the authors' program
-    /// does with all of its maps).
+    /// Each vector (x, y, z) becomes (x, −y, z): from maps whose green channel grows downwards (as the reference
+    /// implementation does with all of its maps).
     #[must_use]
     pub fn flip_y(mut self) -> Self {
         self.normals.iter_mut().for_each(|n| n[1] = -n[1]);
@@ -121,7 +121,7 @@ pub fn read_mask(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<bool>)> {
 /// and the colours, row-major.
 ///
 /// # Errors
-/// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is no such image.
+/// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is not such an image.
 pub fn read_albedo(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<[f32; 3]>)> {
     let path = path.as_ref();
     if let Some((size, pixels)) = display(path)? {

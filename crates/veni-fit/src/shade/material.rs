@@ -74,12 +74,14 @@ impl Material {
         };
         let fine = |c: &[f32; 3]| c.iter().all(|v| v.is_finite() && *v >= 0.0);
         if let Some(wrong) = colours.iter().find(|c| !fine(c)) {
-            return Err(Error::invalid(format!("{wrong:?} is no reflectance: it must be finite, 0 or more")));
+            return Err(Error::invalid(format!(
+                "{wrong:?} is not a reflectance: it must be finite, 0 or more"
+            )));
         }
         if let Some(s) = &self.specular {
             if !fine(&s.colour) {
                 return Err(Error::invalid(format!(
-                    "{:?} is no specular reflectance: it must be finite, 0 or more",
+                    "{:?} is not a specular reflectance: it must be finite, 0 or more",
                     s.colour
                 )));
             }
@@ -150,7 +152,7 @@ impl Lobes {
                 if cosine <= 0.0 {
                     return 0.0;
                 }
-                // most pairs are far down the lobe: told without a root
+                // most pairs are far down the lobe: decided without a root
                 let half = add(light, self.view);
                 let (along, square) = (cosine + self.facing, dot(half, half));
                 if along <= 0.0 || along * along < self.cutoff * self.cutoff * square {
@@ -167,7 +169,8 @@ impl Lobes {
         cosine * self.specular * (self.shininess * x.ln()).exp()
     }
 
-    /// n·h in single precision, step by step as in the authors' program: with s = 500, the last bit of this number is
+    /// n·h in single precision, step by step as in the reference implementation: with s = 500, the last bit of this
+    /// number is
     /// 3e-5 of the result.
     fn reference_cosine(&self, light: Vector) -> f32 {
         let normalise = |v: [f32; 3]| {

@@ -8,7 +8,7 @@
 //!
 //! So a [`Transfer`] knows everything but L: it renders, and takes gradients back. A [`ShadedImage`] compares the
 //! result with a photograph and gives the gradient of a loss with respect to log radiance and exposure, which is all
-//! that a fit of a latent to a shaded image needs.
+//! that a fit of a latent to a rendered image needs.
 //!
 //! | here | what |
 //! |---|---|
@@ -48,7 +48,7 @@ pub use raster::Mesh;
 pub use surface::Surface;
 pub use transfer::{DEFAULT_MEMORY, Transfer};
 
-/// Physics, or the authors' program to the letter.
+/// Physics, or the reference implementation to the letter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ShadingForm {
     /// Reflected radiance Σ f L cos θ ω with normalised f; the view vector points to the camera; pixels that show no

@@ -16,7 +16,7 @@ pub struct Surface {
 
 impl Surface {
     /// From normals and rays, [H·W, 3] each. Rays point *away* from the camera; both are normalised here. A pixel shows
-    /// the surface if its normal has a length between 0.5 and 1.5 (as in the authors' program: interpolated normals
+    /// the surface if its normal has a length between 0.5 and 1.5 (as in the reference implementation: interpolated normals
     /// at an edge are too short) and `mask`, if given, says so.
     ///
     /// # Errors

@@ -154,7 +154,7 @@ fn pixels_of_one_normal_share_a_row() {
 /// Central differences along a few coordinates, and along the exposure.
 fn check_gradient(image: &ShadedImage, log_radiance: &[[f32; 3]], s: f32, name: &str) {
     let (_, gradient, exposure) = image.evaluate(log_radiance, s);
-    let slope = |d: &[[f32; 3]], ds: f32| {
+    let derivative = |d: &[[f32; 3]], ds: f32| {
         let h = 2e-3;
         let at = |sign: f32| {
             let moved: Vec<_> =
@@ -164,13 +164,14 @@ fn check_gradient(image: &ShadedImage, log_radiance: &[[f32; 3]], s: f32, name: 
         (at(1.0) - at(-1.0)) / f64::from(2.0 * h)
     };
     let zero = vec![[0.0; 3]; log_radiance.len()];
-    let expected = slope(&zero, 1.0);
+    let expected = derivative(&zero, 1.0);
     assert!((exposure - expected).abs() < 2e-3 * expected.abs().max(0.05), "{name}: {exposure}, {expected}");
     for k in 1..4 {
         let direction: Vec<_> =
             (0..zero.len()).map(|l| [0, 1, 2].map(|c| ((k * (3 * l + c)) as f32 * 0.37).sin())).collect();
         let pairs = direction.iter().flatten().zip(gradient.iter().flatten());
-        let (ours, expected) = (pairs.map(|(a, b)| f64::from(a * b)).sum::<f64>(), slope(&direction, 0.0));
+        let (ours, expected) =
+            (pairs.map(|(a, b)| f64::from(a * b)).sum::<f64>(), derivative(&direction, 0.0));
         assert!((ours - expected).abs() < 5e-3 * expected.abs().max(0.05), "{name}: {ours}, {expected}");
     }
 }

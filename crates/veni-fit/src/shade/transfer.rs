@@ -18,7 +18,7 @@ pub const DEFAULT_MEMORY: usize = 512 << 20;
 /// Parts that an image is cut into, whatever the number of threads, so that sums have one order.
 const PARTS: usize = 32;
 
-/// Light to image: everything of a shaded image but the light.
+/// Light to image: everything of a rendered image but the light.
 ///
 /// Pixels of equal normal (and, with a specular lobe, equal ray) share a row. The matrix is kept if it fits into the
 /// memory allowed; else its rows are computed each time they are needed, which costs time and no memory. Clones share
@@ -181,7 +181,7 @@ impl Transfer {
         self.evaluate(&self.planes(radiance), |at, _| (0.0, gradient[at])).1
     }
 
-    /// One pass over the matrix: for every visible pixel `loss` is told its index and value and returns its part of the
+    /// One pass over the matrix: for every visible pixel `loss` gets its index and value and returns its part of the
     /// loss with the gradient; gives the sum and the gradient with respect to linear radiance.
     pub(super) fn evaluate(
         &self,
@@ -195,16 +195,16 @@ impl Transfer {
                 let sums = kernel::dot(arch, rows, light);
                 let mut factors = [[0.0; 3]; ROWS];
                 self.each_pixel(groups, &sums, |pixel, first, value| {
-                    let (part, slope) = loss(pixel.at, value.map(|v| v.max(self.floor)));
+                    let (part, by_value) = loss(pixel.at, value.map(|v| v.max(self.floor)));
                     total += part;
                     for c in 0..3 {
-                        let slope = if value[c] < self.floor { 0.0 } else { slope[c] };
+                        let by_value = if value[c] < self.floor { 0.0 } else { by_value[c] };
                         match self.lobes {
-                            LobeRows::Diffuse => factors[first][c] += slope * pixel.diffuse[c],
-                            LobeRows::Mixed { .. } => factors[first][c] += slope,
+                            LobeRows::Diffuse => factors[first][c] += by_value * pixel.diffuse[c],
+                            LobeRows::Mixed { .. } => factors[first][c] += by_value,
                             LobeRows::Both { specular } => {
-                                factors[first][c] += slope * pixel.diffuse[c];
-                                factors[first + 1][c] += slope * specular[c];
+                                factors[first][c] += by_value * pixel.diffuse[c];
+                                factors[first + 1][c] += by_value * specular[c];
                             }
                         }
                     }

@@ -91,8 +91,8 @@ impl GpuDecoder {
     /// another model's; [`Error::Gpu`] if the device fails.
     pub fn update(&self, queue: &Queue, into: &GpuLatents, first: u32, latents: &[Latent]) -> Result<()> {
         self.check_owner(into)?;
-        let (count, room) = (latents.len(), into.count.saturating_sub(first) as usize);
-        if count > room {
+        let (count, free) = (latents.len(), into.count.saturating_sub(first) as usize);
+        if count > free {
             return Err(Error::invalid(format!(
                 "{count} latents from the {first}th on do not fit in a batch of {}",
                 into.count

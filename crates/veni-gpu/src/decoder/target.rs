@@ -63,7 +63,7 @@ impl<'a> Bake<'a> {
         Self { frame, ..self }
     }
 
-    /// Turns the scene about z by so many radians, counter-clockwise seen from above.
+    /// Yaw: rotates the scene about z by this angle, radians, counter-clockwise seen from above.
     #[must_use]
     pub fn turn(self, radians: f64) -> Self {
         Self { turn: radians, ..self }

@@ -52,7 +52,7 @@ pub struct Request {
     pub grid: Grid,
     /// Coordinates of the directions: of cube faces and lists.
     pub frame: Frame,
-    /// Turns the scene about z by so many radians, counter-clockwise seen from above.
+    /// Yaw: rotates the scene about z by this angle, radians, counter-clockwise seen from above.
     pub turn: f64,
     /// Added to log radiance.
     pub log_exposure: f32,

@@ -284,21 +284,21 @@ impl Variant {
     }
 }
 
-/// Tile and steps of "tiled" for the workgroup memory at hand; `None` if not even one directional input fits.
+/// Tile and steps of "tiled" for the workgroup memory available; `None` if not even one directional input fits.
 fn tiling(sizes: Sizes, memory: u32) -> Option<Tiling> {
     let groups = sizes.columns() / 2;
     let blocks = (TILED_THREADS / groups.min(TILED_THREADS)).min(TILE / 8);
     let tile = 8 * blocks;
     // vec4s: the tile's directions, then per row its weights and activations
-    let room = (memory as usize / 16).checked_sub(tile)?;
+    let workspace = (memory as usize / 16).checked_sub(tile)?;
     let per_row = sizes.columns() + tile / 4;
-    let rows = room / per_row;
+    let rows = workspace / per_row;
     let input_step = [4, 2, 1].into_iter().find(|inputs| 5 * inputs <= rows)?;
     let step = (rows.min(STEP) / 4 * 4).min(4 * sizes.columns());
     let rows = step.max(5 * input_step);
-    // partial sums use the same room
+    // partial sums use the same workspace
     let slab = (rows * per_row).max(groups * tile / 4);
-    let fits = slab <= room && groups <= TILED_THREADS && step >= 4;
+    let fits = slab <= workspace && groups <= TILED_THREADS && step >= 4;
     fits.then_some(Tiling { groups, tile, rows, step, input_step, slab })
 }
 

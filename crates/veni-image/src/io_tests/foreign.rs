@@ -111,7 +111,7 @@ fn windows_channels_layers_and_primaries_of_other_software() {
         shared.chromaticities = Some(attribute::Chromaticities { red, green, blue, white });
     });
     assert_close(&grey, &Panorama::read(&path).unwrap(), 1e-5);
-    // a cube map is no panorama
+    // a cube map is not a panorama
     exr_file(&path, (16, 8), rgb(&image), plain, |_, own| own.environment_map = Some(EnvironmentMap::Cube));
     assert!(matches!(Panorama::read(&path), Err(Error::Unsupported(m)) if m.contains("cube")));
 }

@@ -8,7 +8,7 @@ pub enum Alignment {
     /// One exposure factor on radiance: the honest choice for a model that is scale-free.
     #[default]
     Exposure,
-    /// The authors' `estimate_scale`: one factor on *log* radiance. It is an exponent on radiance, that is
+    /// The reference implementation's `estimate_scale`: one factor on *log* radiance. It is an exponent on radiance, that is
     /// a contrast, and no exposure; for comparison with published numbers only.
     LogFactor,
 }

@@ -50,8 +50,8 @@ pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -
         }
         if let Some(factor) = panorama.attributes.get(RADIANCE_SCALE) {
             let factor = factor.parse().ok().filter(|f: &f32| f.is_normal() && *f > 0.0);
-            let factor =
-                factor.ok_or_else(|| Error::invalid(format!("attribute {RADIANCE_SCALE} is no factor")))?;
+            let factor = factor
+                .ok_or_else(|| Error::invalid(format!("attribute {RADIANCE_SCALE} is not a factor")))?;
             panorama.scale(1.0 / factor);
         }
         Ok(panorama)

@@ -56,7 +56,7 @@ impl ReadOptions {
         }
         if width != 2 * height && !self.any_aspect {
             return Err(Error::invalid(format!(
-                "{width} × {height} is no equirectangular panorama: its width must be twice its height"
+                "{width} × {height} is not an equirectangular panorama: its width must be twice its height"
             )));
         }
         Ok(Equirect::new(width, height))

@@ -1,6 +1,6 @@
 //! From radiance to 8-bit sRGB.
 //!
-//! Two curves: [`Tonemap::reference`] is what the LDR metrics of the article use (its own 98 % quantile becomes
+//! Two curves: [`Tonemap::reference`] is what the LDR metrics of the paper use (its own 98 % quantile becomes
 //! white, sRGB curve, clamped), and [`Tonemap::filmic`] is for previews that people look at.
 
 mod srgb;
@@ -35,7 +35,7 @@ pub enum Curve {
 }
 
 impl Tonemap {
-    /// The article's: radiance divided by its own 98 % quantile over all values.
+    /// The paper's: radiance divided by its own 98 % quantile over all values.
     pub fn reference(image: &Panorama) -> Self {
         let white = quantile(image.pixels().as_flattened(), REFERENCE_QUANTILE).max(f32::MIN_POSITIVE);
         Self { scale: 1.0 / white, curve: Curve::Srgb }
@@ -66,7 +66,7 @@ impl Tonemap {
     }
 }
 
-/// Radiance to the LDR space of the article's metrics: divided by its own 98 % quantile over all values, sRGB
+/// Radiance to the LDR space of the paper's metrics: divided by its own 98 % quantile over all values, sRGB
 /// curve, clamped to [0, 1]. Returns the values and the quantile.
 ///
 /// # Panics

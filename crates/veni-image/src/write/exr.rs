@@ -37,7 +37,9 @@ pub(super) fn write(
 ) -> Result<()> {
     let factor = match options.half_range {
         HalfRange::Factor(f) if f.is_normal() && f > 0.0 => f,
-        HalfRange::Factor(f) => return Err(Error::invalid(format!("{f} is no factor to scale radiance by"))),
+        HalfRange::Factor(f) => {
+            return Err(Error::invalid(format!("{f} is not a factor to scale radiance by")));
+        }
         HalfRange::Refuse => 1.0,
         HalfRange::Fit => {
             return Err(Error::invalid(

@@ -141,7 +141,7 @@ impl RowSink<'_> {
         let count = rows.len() / width;
         assert!(
             rows.len() == count * width && self.row + count <= height,
-            "{} pixels are no whole rows below row {} of a {width} × {height} image",
+            "{} pixels are not whole rows below row {} of a {width} × {height} image",
             rows.len(),
             self.row
         );

@@ -81,7 +81,7 @@ pub(super) fn scatter<S: Simd>(simd: S, directions: &[[f32; 3]], rows: &mut [Row
     }
 }
 
-/// Log radiance of one block into the first three rows of `rgb`. `x` and `y` are room for activations.
+/// Log radiance of one block into the first three rows of `rgb`. `x` and `y` are scratch for activations.
 #[inline(always)]
 fn network<S: Simd>(
     simd: S,

@@ -38,7 +38,7 @@ use weights::Weights;
 #[cfg(feature = "training")]
 pub mod training;
 
-pub use gradient::{Curved, Gradient, NormalEquations};
+pub use gradient::{Gradient, LocalQuadratic, NormalEquations};
 pub use rate::multiply_add_rate;
 
 /// Largest |z_x|, |z_y| of a latent. Beyond it f32 does not resolve the phase of the encoding; trained codes

@@ -12,7 +12,7 @@ const CHAINS: usize = 12;
 const STEPS: usize = 8;
 /// A measurement lasts at least so long: starting all threads is then a thousandth of it.
 const LONG_ENOUGH: Duration = Duration::from_millis(20);
-/// The best of so many counts, since other programs only ever make it slower.
+/// The best of this many counts, since other programs only ever make it slower.
 const REPEATS: usize = 8;
 
 /// The rate of f32 multiply-adds of all threads of the current rayon pool together, in registers and with the SIMD that
@@ -34,7 +34,7 @@ pub fn multiply_add_rate() -> f64 {
     operations / best.as_secs_f64()
 }
 
-/// Runs so many rounds on every thread: the time until the last is done, and floating-point operations of all.
+/// Runs this many rounds on every thread: the time until the last is done, and floating-point operations of all.
 fn timed(rounds: usize) -> (Duration, f64) {
     let started = Instant::now();
     let lanes = super::tasks::on_every_thread(|| pulp::Arch::new().dispatch(Chains { rounds }));

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use super::gradient::Joint;
+use super::gradient::ValueOutput;
 use super::mlp::{Mlp, PANEL};
 use crate::model::{Model, VnReluForm};
 
@@ -43,7 +43,7 @@ pub(super) struct Weights {
     pub(super) input_bias: Vec<f32>,
     pub(super) mlp: Mlp,
     /// Made when the first normal equations are asked for.
-    joint: OnceLock<Vec<Joint>>,
+    value_output: OnceLock<Vec<ValueOutput>>,
 }
 
 impl Weights {
@@ -69,13 +69,14 @@ impl Weights {
             attention: (0..config.decoder.layers).map(attention).collect(),
             input_bias,
             mlp: Mlp::new(config.decoder.hidden, config.decoder.layers, tensor),
-            joint: OnceLock::new(),
+            value_output: OnceLock::new(),
         }
     }
 
     /// The two linear maps of every layer's attention in one.
-    pub(super) fn joint(&self) -> &[Joint] {
-        self.joint.get_or_init(|| self.attention.iter().map(|a| Joint::new(&a.value, &a.out)).collect())
+    pub(super) fn value_output(&self) -> &[ValueOutput] {
+        self.value_output
+            .get_or_init(|| self.attention.iter().map(|a| ValueOutput::new(&a.value, &a.out)).collect())
     }
 }
 

@@ -5,7 +5,7 @@ use crate::cholesky::{self, Complex};
 
 impl Prior {
     /// −ln p of the vectors up to a constant, |L⁻¹c|² + ½ |K⁻¹(z − μ)|² in the notation of [`Prior`], and its
-    /// derivatives by x, y, z of each. For [`Prior::standard`] it is ½ Σ |vector|².
+    /// derivatives with respect to x, y, z of each. For [`Prior::standard`] it is ½ Σ |vector|².
     ///
     /// # Panics
     /// If there are not N vectors.
@@ -48,21 +48,21 @@ mod tests {
     #[test]
     fn standard_is_half_the_square() {
         let latent = Latent::from_seed(&Prior::standard(5), 1);
-        let (energy, slopes) = Prior::standard(5).energy(&latent.vectors);
+        let (energy, gradient) = Prior::standard(5).energy(&latent.vectors);
         let half = 0.5 * latent.vectors.as_flattened().iter().map(|v| f64::from(v * v)).sum::<f64>();
         assert!((energy - half).abs() < 1e-5 * half);
-        let pairs = slopes.as_flattened().iter().zip(latent.vectors.as_flattened());
+        let pairs = gradient.as_flattened().iter().zip(latent.vectors.as_flattened());
         assert!(pairs.into_iter().all(|(s, v)| (s - f64::from(*v)).abs() < 1e-5));
     }
 
     #[test]
-    fn slopes_agree_with_differences_and_turning_changes_nothing() {
+    fn gradients_agree_with_differences_and_turning_changes_nothing() {
         let prior = Prior::fit(&codes(), None).unwrap();
         let latent = Latent::from_seed(&Prior::standard(4), 9);
-        let (energy, slopes) = prior.energy(&latent.vectors);
+        let (energy, gradient) = prior.energy(&latent.vectors);
         let (turned, _) = prior.energy(&latent.turned(1.1).vectors);
         assert!((energy - turned).abs() < 1e-4 * energy);
-        for (k, slope) in slopes.as_flattened().iter().enumerate() {
+        for (k, derivative) in gradient.as_flattened().iter().enumerate() {
             let at = |step: f32| {
                 let mut moved = latent.vectors.clone();
                 moved.as_flattened_mut()[k] += step;
@@ -71,7 +71,10 @@ mod tests {
             let step = 1.0 / 64.0;
             // a quadratic: central differences are exact
             let expected = (at(step) - at(-step)) / (2.0 * f64::from(step));
-            assert!((slope - expected).abs() < 1e-4 * (1.0 + expected.abs()), "{k}: {slope} {expected}");
+            assert!(
+                (derivative - expected).abs() < 1e-4 * (1.0 + expected.abs()),
+                "{k}: {derivative} {expected}"
+            );
         }
     }
 

@@ -57,7 +57,7 @@ impl Latent {
     /// Reads the JSON text.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if it is no such JSON, if `n` is not the number of vectors, or a number is not
+    /// [`Error::Invalid`] if it is not such JSON, if `n` is not the number of vectors, or a number is not
     /// finite; [`Error::Unsupported`] for an unknown format.
     pub fn from_json(json: &str) -> Result<Self> {
         let broken = |e: serde_json::Error| Error::invalid(format!("not a latent ({e})"));

@@ -63,7 +63,7 @@ pub enum ModelKind {
     Reni,
 }
 
-/// What the VN-ReLU subtracts when ⟨q, k⟩ < 0 (the Vector-Neuron paper against the authors' program).
+/// What the VN-ReLU subtracts when ⟨q, k⟩ < 0 (the Vector-Neuron paper against the reference implementation).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum VnReluForm {

@@ -30,7 +30,7 @@ pub struct DecoderConfig {
     /// How the latent enters the network.
     #[serde(skip_serializing_if = "is_default")]
     pub conditioning: Conditioning,
-    /// What the network is told about the latent apart from its products with the direction.
+    /// What the network is conditioned on apart from the latent's products with the direction.
     #[serde(skip_serializing_if = "is_default")]
     pub invariance: Invariance,
     /// Which rotations of latent and direction together leave the radiance as it is.
@@ -92,7 +92,7 @@ pub enum Conditioning {
     Tokens,
 }
 
-/// What the network is told about the latent apart from its products with the direction.
+/// What the network is conditioned on apart from the latent's products with the direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Invariance {
@@ -112,7 +112,7 @@ pub enum Equivariance {
     So2,
     /// All.
     So3,
-    /// None: the network is told the latent itself.
+    /// None: the network is conditioned on the latent itself.
     None,
 }
 
@@ -123,7 +123,7 @@ pub enum Encoding {
     /// The directional input.
     #[default]
     Directions,
-    /// What the network is told about the latent.
+    /// How the latent's condition features are made.
     Condition,
     /// Each of the two.
     Both,
@@ -194,7 +194,7 @@ impl DecoderConfig {
         if self.encodes_directions() { 5 * width } else { width }
     }
 
-    /// Numbers that the network is told about each latent vector, before their encoding.
+    /// Number of condition features of each latent vector, before their encoding.
     pub fn token_inputs(&self, latent_vectors: usize) -> usize {
         match (self.invariance, self.equivariance) {
             (_, Equivariance::None) | (Invariance::Vn, _) => 3,
@@ -203,7 +203,7 @@ impl DecoderConfig {
         }
     }
 
-    /// Numbers that the network is told about the latent, after their encoding.
+    /// Number of condition features of the latent, after their encoding.
     pub fn condition_inputs(&self, latent_vectors: usize) -> usize {
         let width = latent_vectors * self.token_inputs(latent_vectors);
         if self.encodes_condition() { 5 * width } else { width }
@@ -223,7 +223,7 @@ impl DecoderConfig {
         matches!(self.encoding, Encoding::Directions | Encoding::Both)
     }
 
-    /// Whether what the network is told about the latent is encoded.
+    /// Whether the condition features are encoded.
     pub fn encodes_condition(&self) -> bool {
         matches!(self.encoding, Encoding::Condition | Encoding::Both)
     }

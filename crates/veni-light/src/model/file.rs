@@ -111,7 +111,7 @@ impl Model {
 }
 
 fn too_large() -> Error {
-    Error::too_large(format!("larger than {} MiB, no model of ours", MAX_FILE_BYTES >> 20))
+    Error::too_large(format!("larger than {} MiB, not a veni model", MAX_FILE_BYTES >> 20))
 }
 
 fn values<const B: usize>(bytes: &[u8], decode: impl Fn([u8; B]) -> f32) -> Vec<f32> {

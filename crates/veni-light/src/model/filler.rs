@@ -7,7 +7,7 @@ impl Model {
     /// A decode-only model with pseudo-random weights of trained-like magnitude, the same on every machine.
     ///
     /// Each tensor is filled by SplitMix64 started at FNV-1a(key) ⊕ seed, where the key is the name the
-    /// tensor has in the authors' program; their layout [out, in] is transposed to ours. The golden cases
+    /// tensor has in the reference implementation; their layout [out, in] is transposed to ours. The golden cases
     /// named `*_filler` use the same formula, so this builds their decoders.
     ///
     /// # Errors
@@ -24,7 +24,7 @@ impl Model {
     }
 }
 
-/// The authors' name of a decoder tensor. They have no tokens; those have the names of the attention.
+/// The reference implementation's name of a decoder tensor. They have no tokens; those have the names of the attention.
 fn official_key(name: &str, config: &ModelConfig) -> String {
     let name = name.strip_prefix("decoder.").unwrap_or(name);
     match name {

@@ -173,9 +173,9 @@ fn other_stored_types_are_unsupported() {
 #[cfg(feature = "pretrained")]
 #[test]
 fn embedded_models_decode() {
-    for numbers in Model::pretrained_sizes() {
-        let model = Model::pretrained_of(numbers).unwrap();
-        assert_eq!(3 * model.latent_vectors(), numbers);
+    for dimension in Model::pretrained_sizes() {
+        let model = Model::pretrained_of(dimension).unwrap();
+        assert_eq!(3 * model.latent_vectors(), dimension);
         assert!(
             model.has_encoder() && model.has_prior() && model.info().licence.is_some(),
             "{:?}",
@@ -183,7 +183,7 @@ fn embedded_models_decode() {
         );
         let latent = Latent::from_seed(&model.prior(), 1);
         let radiance = model.decoder().unwrap().condition(&latent).unwrap().radiance([1.0, 0.0, 0.0]);
-        assert!(radiance.iter().all(|v| v.is_finite() && *v > 0.0), "{numbers}: {radiance:?}");
+        assert!(radiance.iter().all(|v| v.is_finite() && *v > 0.0), "{dimension}: {radiance:?}");
     }
     assert_eq!(Some(Model::pretrained()), Model::pretrained_of(27));
     assert_eq!(Model::pretrained_of(28), None);

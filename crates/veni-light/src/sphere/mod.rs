@@ -14,7 +14,7 @@
 //! | [`Frame`] | directions of Blender, glTF, OpenEXR/USD, Bevy |
 //! | [`CubeFace`] | cube maps: texel directions and solid angles |
 //! | [`Stripes`], [`Gather`] | where the encoder looks, and fast lookup there |
-//! | [`mod@reference`] | the samplers of the authors' program, for their weights and numbers |
+//! | [`mod@reference`] | the samplers of the reference implementation, for their weights and numbers |
 
 mod cube;
 mod equirect;

@@ -1,4 +1,4 @@
-//! The directions and samplers of the authors' program, for their weights and their numbers only; veni itself
+//! The directions and samplers of the reference implementation, for their weights and their numbers only; veni itself
 //! uses [`Stripes`](super::Stripes) and [`Equirect`].
 //!
 //! Two frames besides the native one occur there. The *camera* frame d belongs to the decoder: the image centre
@@ -25,7 +25,7 @@ pub fn encoder_to_native([x, y, z]: [f32; 3]) -> [f32; 3] {
 
 /// The decoder's directions for an image, camera frame, row-major: with s = 2(i+½)/W − 1 and θ = π(j+½)/H,
 /// d = (sin πs sin θ, −cos πs sin θ, cos θ), normalised once more. In single precision, step by step as the
-/// authors' program does: a latent fit with large steps amplifies the last bit of a direction ten-thousandfold.
+/// reference implementation does: a latent fit with large steps amplifies the last bit of a direction ten-thousandfold.
 /// (What remains is the last bit of the sine itself, in one row or column of ten.)
 pub fn decoder_directions(grid: Equirect) -> Vec<[f32; 3]> {
     let (w, h) = (grid.width as f32, grid.height as f32);
@@ -116,8 +116,8 @@ fn reflected(coordinate: f32, n: usize) -> Pair {
     Pair::new(low as usize, (low as usize + 1).min(n - 1), f64::from(at - low))
 }
 
-/// The golden-angle spiral on the unit disk: point i at radius √((i+½)/n) and angle i·π(3 − √5).
-pub fn sunflower_disk(n: usize) -> Vec<[f32; 2]> {
+/// The Fibonacci (golden-angle) lattice on the unit disk: point i at radius √((i+½)/n) and angle i·π(3 − √5).
+pub fn fibonacci_disk(n: usize) -> Vec<[f32; 2]> {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     (0..n)
         .map(|i| {
@@ -130,7 +130,7 @@ pub fn sunflower_disk(n: usize) -> Vec<[f32; 2]> {
 
 /// The golden spiral on the sphere: z = 1 − 2(i+½)/n, azimuth π(1 + √5)(i+½), the latter in single precision,
 /// whose rounding shows from a hundred points on.
-pub fn sunflower_sphere(n: usize) -> Vec<[f32; 3]> {
+pub fn fibonacci_sphere(n: usize) -> Vec<[f32; 3]> {
     let turn = (std::f64::consts::PI * (1.0 + 5f64.sqrt())) as f32;
     (0..n)
         .map(|i| {
@@ -142,14 +142,14 @@ pub fn sunflower_sphere(n: usize) -> Vec<[f32; 3]> {
         .collect()
 }
 
-/// Patches of a [`sunflower_disk`] on planes that touch the sphere, [patches, samples] row-major, not normalised.
-/// The centre of a patch is c = (s_y, s_z, −s_x) of a [`sunflower_sphere`] point s; its disk has the radius
+/// Patches of a [`fibonacci_disk`] on planes that touch the sphere, [patches, samples] row-major, not normalised.
+/// The centre of a patch is c = (s_y, s_z, −s_x) of a [`fibonacci_sphere`] point s; its disk has the radius
 /// tan(fov/2) and is spanned by e₁ = c × z normalised and e₂ = e₁ × c.
-pub fn double_sunflower(patches: usize, samples: usize, fov_degrees: f64) -> Vec<[f32; 3]> {
+pub fn double_fibonacci(patches: usize, samples: usize, fov_degrees: f64) -> Vec<[f32; 3]> {
     let radius = (0.5 * fov_degrees.to_radians()).tan();
-    let disk = sunflower_disk(samples);
+    let disk = fibonacci_disk(samples);
     let mut out = Vec::with_capacity(patches * samples);
-    for [sx, sy, sz] in sunflower_sphere(patches) {
+    for [sx, sy, sz] in fibonacci_sphere(patches) {
         let c = [sy, sz, -sx].map(f64::from);
         let length = c[0].hypot(c[1]).max(f64::MIN_POSITIVE);
         let e1 = [c[1] / length, -c[0] / length, 0.0];
@@ -162,7 +162,7 @@ pub fn double_sunflower(patches: usize, samples: usize, fov_degrees: f64) -> Vec
     out
 }
 
-/// The authors' rotation by pitch about x and yaw about z, rows first:
+/// The reference implementation's rotation by pitch about x and yaw about z, rows first:
 /// [[cos y, sin y, 0], [−sin y, cos y, 0], [0, 0, 1]] · [[1, 0, 0], [0, cos p, sin p], [0, −sin p, cos p]].
 pub fn pitch_yaw(pitch: f32, yaw: f32) -> [[f32; 3]; 3] {
     let ((sp, cp), (sy, cy)) = (pitch.sin_cos(), yaw.sin_cos());

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub enum StripeSampling {
     /// Meridians and heights at cell centres, wrapped seam: exactly equivariant under whole stripes.
     Exact,
-    /// The authors' grid (both ends doubled, unwrapped seam), for their weights.
+    /// The reference implementation's grid (both ends doubled, unwrapped seam), for their weights.
     Reference,
 }
 
@@ -154,7 +154,7 @@ fn turned([x, y, z]: [f32; 3], yaw: f64) -> [f32; 3] {
         return [x, y, z];
     }
     let (sin, cos) = (yaw as f32).sin_cos();
-    // The authors' product with a 3 × 3 matrix adds a zero from the third column, and any zero sum of theirs is
-    // positive. At the poles the sign decides which column is read.
+    // The reference implementation's product with a 3 × 3 matrix adds a zero from the third column, and any zero sum of
+    // theirs is positive. At the poles the sign decides which column is read.
     [cos * x + sin * y + 0.0, cos * y - sin * x + 0.0, z]
 }

@@ -1,24 +1,24 @@
 //! Which clouds a sky has.
 
-use crate::deck::{Deck, DeckKind};
+use crate::cloud_layer::{CloudKind, CloudLayer};
 use crate::random::Draw;
 use crate::scene::SkyKind;
 
-/// Decks of cloud for this weather; `cover` if it is given.
-pub(super) fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<Deck> {
+/// Cloud layers of this weather; `cover` if it is given.
+pub(super) fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<CloudLayer> {
     let wind = draw.azimuth();
     let closed = sky == SkyKind::Overcast;
-    let [low, sheet, high] = match sky {
+    let [low, stratus, high] = match sky {
         SkyKind::Clear => [0.08, 0.03, 0.3],
         SkyKind::Cloudy => [0.5, 0.4, 0.5],
         SkyKind::Overcast => [0.5, 1.0, 0.0],
         SkyKind::Sunset => [0.3, 0.3, 0.5],
         SkyKind::Night => [0.25, 0.2, 0.3],
     };
-    let mut decks = Vec::new();
-    let (with_low, with_sheet, with_high) = (draw.chance(low), draw.chance(sheet), draw.chance(high));
-    let heap = Deck {
-        kind: DeckKind::Heap,
+    let mut layers = Vec::new();
+    let (with_low, with_stratus, with_high) = (draw.chance(low), draw.chance(stratus), draw.chance(high));
+    let cumulus = CloudLayer {
+        kind: CloudKind::Cumulus,
         base: draw.log_range(0.7, 2.2),
         thickness: draw.log_range(0.25, 1.6),
         cover: draw.range(0.06, 0.55),
@@ -30,8 +30,8 @@ pub(super) fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<D
         cells: 0.0,
         seed: draw.bits(),
     };
-    let middle = Deck {
-        kind: DeckKind::Sheet,
+    let middle = CloudLayer {
+        kind: CloudKind::Stratus,
         base: if closed { draw.log_range(0.6, 3.0) } else { draw.log_range(2.2, 5.5) },
         thickness: 0.5,
         cover: if closed { 1.0 } else { draw.range(0.15, 0.8) },
@@ -43,8 +43,8 @@ pub(super) fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<D
         cells: if draw.chance(0.3) { draw.range(0.1, 0.7) } else { 0.0 },
         seed: draw.bits(),
     };
-    let cirrus = Deck {
-        kind: DeckKind::Sheet,
+    let cirrus = CloudLayer {
+        kind: CloudKind::Stratus,
         base: draw.range(6.5, 10.5),
         thickness: 0.5,
         cover: draw.range(0.2, 0.8),
@@ -56,28 +56,28 @@ pub(super) fn clouds(draw: &mut Draw, sky: SkyKind, cover: Option<f32>) -> Vec<D
         cells: if draw.chance(0.25) { draw.range(0.1, 0.6) } else { 0.0 },
         seed: draw.bits(),
     };
-    for (present, deck) in [(with_low, heap), (with_sheet, middle), (with_high, cirrus)] {
+    for (present, layer) in [(with_low, cumulus), (with_stratus, middle), (with_high, cirrus)] {
         if present {
-            decks.push(deck);
+            layers.push(layer);
         }
     }
     if let Some(cover) = cover {
         if cover == 0.0 {
             return Vec::new();
         }
-        if decks.is_empty() {
+        if layers.is_empty() {
             // drawn again with the same numbers that a cloudy sky would have used
             return clouds_forced(draw, wind, cover);
         }
-        decks.iter_mut().for_each(|d| d.cover = cover);
+        layers.iter_mut().for_each(|d| d.cover = cover);
     }
-    decks
+    layers
 }
 
-/// A deck of heaps for a sky that drew no cloud but must have some.
-fn clouds_forced(draw: &mut Draw, wind: f32, cover: f32) -> Vec<Deck> {
-    vec![Deck {
-        kind: DeckKind::Heap,
+/// A cumulus layer for a sky that drew no cloud but must have some.
+fn clouds_forced(draw: &mut Draw, wind: f32, cover: f32) -> Vec<CloudLayer> {
+    vec![CloudLayer {
+        kind: CloudKind::Cumulus,
         base: 1.3,
         thickness: 0.6,
         cover,

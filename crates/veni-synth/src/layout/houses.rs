@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::Builder;
-use crate::skin::Skin;
+use crate::material::Material;
 use crate::solid::Shape;
 
 impl Builder {
@@ -19,10 +19,10 @@ impl Builder {
         self.draw.weighted(&tones) * self.draw.log_range(0.7, 1.25)
     }
 
-    pub(super) fn facade(&mut self) -> Skin {
+    pub(super) fn facade(&mut self) -> Material {
         let albedo = self.plaster();
         let lit = if self.lit { self.draw.range(0.05, 0.4) } else { 0.0 };
-        Skin::Facade {
+        Material::Facade {
             albedo,
             floor: self.draw.range(2.8, 3.8),
             bay: self.draw.range(1.8, 4.0),
@@ -38,8 +38,8 @@ impl Builder {
             let height = self.draw.range(2.6, 7.0);
             let axis = Vec2::from_angle(self.draw.azimuth());
             let ridge = if self.draw.chance(0.85) { self.draw.range(1.5, 4.0) } else { 0.0 };
-            let skin = self.facade();
-            self.add(Shape::block(at, axis, half, [0.0, height, ridge]), skin);
+            let material = self.facade();
+            self.add(Shape::block(at, axis, half, [0.0, height, ridge]), material);
         }
     }
 
@@ -59,7 +59,7 @@ impl Builder {
             let distance = radius * self.draw.range(0.95, 1.2);
             let height = level * self.draw.log_range(0.6, 1.5);
             let ridge = if self.draw.chance(0.4) { self.draw.range(1.0, 4.0) } else { 0.0 };
-            let skin = self.facade();
+            let material = self.facade();
             self.add(
                 Shape::block(
                     bearing * (distance + depth),
@@ -67,7 +67,7 @@ impl Builder {
                     Vec2::new(length, depth),
                     [0.0, height, ridge],
                 ),
-                skin,
+                material,
             );
         }
     }
@@ -88,10 +88,10 @@ impl Builder {
                     let back = width + self.draw.range(-0.3, 0.8) + depth;
                     let ridge = if self.draw.chance(0.35) { self.draw.range(1.0, 4.0) } else { 0.0 };
                     let centre = along * (at + 0.5 * length) + across * (side * back + off);
-                    let skin = self.facade();
+                    let material = self.facade();
                     self.add(
                         Shape::block(centre, along, Vec2::new(0.5 * length, depth), [0.0, height, ridge]),
-                        skin,
+                        material,
                     );
                 }
                 at += length + if self.draw.chance(0.15) { self.draw.range(2.0, 10.0) } else { 0.0 };
@@ -126,9 +126,9 @@ impl Builder {
             (1.0, Vec3::new(0.03, 0.06, 0.2)),
         ];
         let albedo = self.draw.weighted(&paints);
-        let skin = Skin::Plain { albedo, mottle: 0.05, size: 1.0 };
-        self.add(Shape::block(at, axis, Vec2::new(2.1, 0.85), [0.2, 0.9, 0.0]), skin);
-        let glass = Skin::Plain { albedo: Vec3::splat(0.05), mottle: 0.05, size: 1.0 };
+        let material = Material::Plain { albedo, mottle: 0.05, size: 1.0 };
+        self.add(Shape::block(at, axis, Vec2::new(2.1, 0.85), [0.2, 0.9, 0.0]), material);
+        let glass = Material::Plain { albedo: Vec3::splat(0.05), mottle: 0.05, size: 1.0 };
         self.add(Shape::block(at - 0.2 * axis, axis, Vec2::new(1.2, 0.75), [0.9, 1.45, 0.0]), glass);
     }
 
@@ -148,9 +148,9 @@ impl Builder {
         let off =
             axis * self.draw.range(-0.7, 0.7) * half.x + axis.perp() * self.draw.range(-0.8, 0.8) * half.y;
         let albedo = self.plaster() * 0.8;
-        let skin = Skin::Plain { albedo, mottle: 0.3, size: 2.0 };
+        let material = Material::Plain { albedo, mottle: 0.3, size: 2.0 };
         let thick = self.draw.range(0.3, 1.2);
-        self.add(Shape::block(off, axis, half, [height, height + thick, 0.0]), skin);
+        self.add(Shape::block(off, axis, half, [height, height + thick, 0.0]), material);
         let closed = self.draw.range(0.1, 0.8);
         for (dir, reach, length) in [
             (axis, half.x, half.y),
@@ -160,7 +160,10 @@ impl Builder {
         ] {
             let middle = off + dir * reach;
             if self.draw.chance(closed * 0.75) {
-                self.add(Shape::block(middle, dir.perp(), Vec2::new(length, 0.15), [0.0, height, 0.0]), skin);
+                self.add(
+                    Shape::block(middle, dir.perp(), Vec2::new(length, 0.15), [0.0, height, 0.0]),
+                    material,
+                );
             } else {
                 let pillars = self.draw.count(2, 5);
                 for k in 0..pillars {
@@ -168,7 +171,7 @@ impl Builder {
                     let at = middle + dir.perp() * s;
                     if at.length() > 0.8 {
                         let radius = self.draw.range(0.12, 0.4).min(0.3 * at.length());
-                        self.add(Shape::Trunk { centre: at, radius, low: 0.0, high: height }, skin);
+                        self.add(Shape::Trunk { centre: at, radius, low: 0.0, high: height }, material);
                     }
                 }
             }

@@ -3,8 +3,8 @@
 use glam::{Vec2, Vec3};
 
 use super::{Builder, Lamp};
+use crate::material::Material;
 use crate::scene::Place;
-use crate::skin::Skin;
 use crate::solid::Shape;
 
 impl Builder {
@@ -17,8 +17,8 @@ impl Builder {
 
     pub(super) fn lamp_post(&mut self, at: Vec2) {
         let height = self.draw.range(3.5, 7.5);
-        let skin = Skin::Plain { albedo: Vec3::splat(0.08), mottle: 0.1, size: 1.0 };
-        self.add(Shape::Trunk { centre: at, radius: 0.07, low: 0.0, high: height }, skin);
+        let material = Material::Plain { albedo: Vec3::splat(0.08), mottle: 0.1, size: 1.0 };
+        self.add(Shape::Trunk { centre: at, radius: 0.07, low: 0.0, high: height }, material);
         if !self.lit {
             return;
         }

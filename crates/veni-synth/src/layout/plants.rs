@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::{Builder, Canopy};
-use crate::skin::Skin;
+use crate::material::Material;
 use crate::solid::Shape;
 
 /// Trees of one grove.
@@ -50,7 +50,7 @@ impl Builder {
         let clear = height * self.draw.range(0.05, 0.35);
         self.add(
             Shape::Trunk { centre: at, radius, low: 0.0, high: 0.7 * height },
-            Skin::Plain { albedo: bark, mottle: 0.5, size: 0.4 },
+            Material::Plain { albedo: bark, mottle: 0.5, size: 0.4 },
         );
         let spread = height * self.draw.range(0.18, 0.4);
         let open = self.draw.range(0.0, 0.35);
@@ -62,7 +62,7 @@ impl Builder {
             let tall = size * self.draw.range(0.6, 1.1);
             self.add(
                 Shape::Crown { centre: (at + off).extend(z), radii: Vec3::new(size, size, tall) },
-                Skin::Leaves { albedo, open, size: 0.12 * spread + 0.25 },
+                Material::Leaves { albedo, open, size: 0.12 * spread + 0.25 },
             );
         }
     }
@@ -72,14 +72,14 @@ impl Builder {
         let bark = self.bark();
         self.add(
             Shape::Trunk { centre: at, radius: 0.015 * height + 0.05, low: 0.0, high: 0.8 * height },
-            Skin::Plain { albedo: bark, mottle: 0.4, size: 0.4 },
+            Material::Plain { albedo: bark, mottle: 0.4, size: 0.4 },
         );
         let low = height * self.draw.range(0.05, 0.3);
         let radius = height * self.draw.range(0.14, 0.24);
         let open = self.draw.range(0.05, 0.4);
         self.add(
             Shape::Spire { centre: at, radius, low, high: height },
-            Skin::Leaves { albedo, open, size: 0.5 },
+            Material::Leaves { albedo, open, size: 0.5 },
         );
     }
 
@@ -91,7 +91,7 @@ impl Builder {
             let open = self.draw.range(0.0, 0.3);
             self.add(
                 Shape::Crown { centre: at.extend(0.4 * size), radii: Vec3::new(size, size, 0.9 * size) },
-                Skin::Leaves { albedo, open, size: 0.3 * size + 0.1 },
+                Material::Leaves { albedo, open, size: 0.3 * size + 0.1 },
             );
         }
     }
@@ -107,7 +107,7 @@ impl Builder {
             let shade = self.draw.log_range(0.7, 1.4);
             self.add(
                 Shape::Trunk { centre: at, radius, low: 0.0, high: height },
-                Skin::Plain { albedo: bark * shade, mottle: 0.5, size: 0.5 },
+                Material::Plain { albedo: bark * shade, mottle: 0.5, size: 0.5 },
             );
             if at.length() > 6.0 && self.draw.chance(0.55) {
                 let albedo = self.leaves();
@@ -120,14 +120,14 @@ impl Builder {
                             low: 0.3 * height,
                             high: 1.1 * height,
                         },
-                        Skin::Leaves { albedo: albedo * 0.8, open, size: 0.6 },
+                        Material::Leaves { albedo: albedo * 0.8, open, size: 0.6 },
                     );
                 } else {
                     let size = self.draw.range(1.2, 3.2);
                     let z = height * self.draw.range(0.35, 0.95);
                     self.add(
                         Shape::Crown { centre: at.extend(z), radii: Vec3::new(size, size, size) },
-                        Skin::Leaves { albedo, open, size: 0.5 },
+                        Material::Leaves { albedo, open, size: 0.5 },
                     );
                 }
             }

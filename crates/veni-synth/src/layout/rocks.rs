@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::Builder;
-use crate::skin::Skin;
+use crate::material::Material;
 use crate::solid::Shape;
 
 impl Builder {
@@ -26,7 +26,7 @@ impl Builder {
             let shade = self.draw.log_range(0.7, 1.3);
             self.add(
                 Shape::Hull { centre: at, radius: 1.45 * size, axis, planes },
-                Skin::Plain { albedo: rock * shade, mottle: 0.5, size: 0.4 * size + 0.1 },
+                Material::Plain { albedo: rock * shade, mottle: 0.5, size: 0.4 * size + 0.1 },
             );
         }
     }
@@ -40,7 +40,7 @@ impl Builder {
         let axis = Vec2::from_angle(self.draw.normal(0.0, 0.3)).rotate(bearing.perp());
         self.add(
             Shape::block(bearing * (distance + depth), axis, Vec2::new(length, depth), [0.0, height, 0.0]),
-            Skin::Plain { albedo: rock, mottle: 0.6, size: 1.5 },
+            Material::Plain { albedo: rock, mottle: 0.6, size: 1.5 },
         );
     }
 }

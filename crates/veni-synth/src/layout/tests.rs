@@ -2,15 +2,15 @@
 //! at night only.
 
 use super::*;
-use crate::draw::Fixed;
+use crate::draw::Overrides;
 use crate::scene::SkyKind;
 use veni_image::luminance;
 
-/// Scenes of every place under this sky, so many of each.
+/// Scenes of every place under this sky, this many of each.
 fn scenes(sky: SkyKind, each: u64) -> impl Iterator<Item = Scene> {
     let of = move |place| {
-        let fixed = Fixed { sky: Some(sky), place: Some(place), ..Fixed::default() };
-        (0..each).map(move |index| Scene::draw(21, index, &fixed))
+        let overrides = Overrides { sky: Some(sky), place: Some(place), ..Overrides::default() };
+        (0..each).map(move |index| Scene::draw(21, index, &overrides))
     };
     Place::ALL.into_iter().flat_map(of)
 }
@@ -59,11 +59,11 @@ fn extent(shape: &Shape) -> Option<[f32; 2]> {
 }
 
 fn is_house(solid: &Solid) -> bool {
-    matches!(solid.skin, Skin::Facade { .. })
+    matches!(solid.material, Material::Facade { .. })
 }
 
 fn is_leaves(solid: &Solid) -> bool {
-    matches!(solid.skin, Skin::Leaves { .. })
+    matches!(solid.material, Material::Leaves { .. })
 }
 
 #[test]
@@ -215,7 +215,7 @@ fn plants_and_cars_stand_on_the_ground() {
 fn lamps_are_lit_at_night_only_and_as_bright_as_lamps_are() {
     let settled = [Place::Street, Place::Square, Place::Courtyard, Place::Village, Place::Park];
     let windows = |layout: &Layout| {
-        let lit = |s: &Solid| matches!(s.skin, Skin::Facade { lit, .. } if lit > 0.0);
+        let lit = |s: &Solid| matches!(s.material, Material::Facade { lit, .. } if lit > 0.0);
         layout.solids.iter().filter(|s| lit(s)).count()
     };
     for sky in SkyKind::ALL {

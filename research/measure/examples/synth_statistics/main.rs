@@ -10,7 +10,7 @@ use std::sync::Mutex;
 
 use veni_core::panorama::Panorama;
 use veni_core::panorama::tonemap::{Tonemap, quantile};
-use veni_core::synth::{Fixed, generate};
+use veni_core::synth::{Overrides, generate};
 
 mod statistics;
 
@@ -58,7 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     generate(
         seed,
         0..count,
-        &Fixed::default(),
+        &Overrides::default(),
         GRID,
         |_| true,
         |scene, panorama| -> Result<(), String> {

@@ -43,7 +43,7 @@ impl Gpu {
         let opened = self.open()?.clone();
         let decoder = GpuDecoder::new(&opened.device, &case.model)?;
         let latents = decoder.condition(&opened.queue, &case.latent)?;
-        Ok(Loaded { room: Room::of(&opened.device), opened, decoder, latents, target: None })
+        Ok(Loaded { limits: Limits::of(&opened.device), opened, decoder, latents, target: None })
     }
 }
 
@@ -67,7 +67,7 @@ struct Loaded {
     opened: Opened,
     decoder: GpuDecoder,
     latents: GpuLatents,
-    room: Room,
+    limits: Limits,
     target: Option<(Equirect, Target)>,
 }
 
@@ -77,7 +77,7 @@ impl Bakes for Loaded {
         let target = match self.target.take() {
             Some((of, target)) if of == grid => target,
             // the old one is gone by now: two large ones may not fit
-            _ => Target::new(device, self.room, grid)?,
+            _ => Target::new(device, self.limits, grid)?,
         };
         let mut encoder =
             checked(device, || device.create_command_encoder(&CommandEncoderDescriptor::default()))?;
@@ -97,14 +97,14 @@ impl Bakes for Loaded {
 
 /// What a device allows.
 #[derive(Clone, Copy)]
-struct Room {
+struct Limits {
     /// Bytes of a storage buffer.
     bytes: u64,
     /// Pixels along a texture's side.
     side: u32,
 }
 
-impl Room {
+impl Limits {
     fn of(device: &Device) -> Self {
         let limits = device.limits();
         let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -122,10 +122,10 @@ enum Target {
 
 impl Target {
     /// A buffer where the device binds one of that size, else a texture where it has one, else a buffer for a part.
-    fn new(device: &Device, room: Room, grid: Equirect) -> Result<Self> {
+    fn new(device: &Device, limits: Limits, grid: Equirect) -> Result<Self> {
         let (width, height) = (grid.width as u32, grid.height as u32);
         let row = PIXEL * u64::from(width);
-        if row * u64::from(height) > room.bytes && width <= room.side && height <= room.side {
+        if row * u64::from(height) > limits.bytes && width <= limits.side && height <= limits.side {
             let descriptor = TextureDescriptor {
                 label: Some("veni bench"),
                 size: Extent3d { width, height, depth_or_array_layers: 1 },
@@ -138,7 +138,7 @@ impl Target {
             };
             return checked(device, || Self::Texture(device.create_texture(&descriptor)));
         }
-        let rows = (room.bytes / row).clamp(1, u64::from(height)) as u32;
+        let rows = (limits.bytes / row).clamp(1, u64::from(height)) as u32;
         let descriptor = BufferDescriptor {
             label: Some("veni bench"),
             size: row * u64::from(rows),
@@ -190,7 +190,7 @@ mod tests {
         Some(gpu::list().into_iter().next().expect("a graphics device, or VENI_SKIP_GPU=1"))
     }
 
-    /// Small rooms stand in for large panoramas, which take too long on a software device.
+    /// Small limits stand in for large panoramas, which take too long on a software device.
     #[test]
     fn a_panorama_goes_where_there_is_room_for_it() {
         let Some(found) = adapter() else { return };
@@ -204,7 +204,7 @@ mod tests {
             (16 * row - 1, 31, 2, false),
             (5 * row, 31, 4, false),
         ] {
-            loaded.room = Room { bytes, side };
+            loaded.limits = Limits { bytes, side };
             loaded.target = None;
             assert!(loaded.bake(grid).unwrap() > Duration::ZERO);
             let (_, target) = loaded.target.as_ref().unwrap();
@@ -217,7 +217,7 @@ mod tests {
     fn what_the_device_refuses_is_an_error() {
         let Some(found) = adapter() else { return };
         let opened = pollster::block_on(found.open()).unwrap();
-        let room = Room { bytes: u64::MAX, side: 0 };
-        assert!(Target::new(&opened.device, room, Equirect::new(1 << 20, 1 << 19)).is_err());
+        let limits = Limits { bytes: u64::MAX, side: 0 };
+        assert!(Target::new(&opened.device, limits, Equirect::new(1 << 20, 1 << 19)).is_err());
     }
 }

@@ -16,7 +16,7 @@ use veni_image::Sheet;
 use crate::output::with_remedy;
 use crate::size::Size;
 
-/// The default size where the picture is no panorama.
+/// The default size where the picture is not a panorama.
 const GRID: [usize; 2] = [1024, 512];
 /// Of the uncertainty, in natural log of radiance, at the hot end of the heat map: one stop.
 const HOT: f32 = std::f32::consts::LN_2;

@@ -84,7 +84,7 @@ fn look(text: &str) -> Result<Look, String> {
     for (angle, part) in angles.iter_mut().zip(parts) {
         *angle = match part.trim().parse::<f64>() {
             Ok(v) if v.is_finite() => v,
-            _ => return Err(format!("'{part}' is no angle in degrees")),
+            _ => return Err(format!("'{part}' is not an angle in degrees")),
         };
     }
     if angles[1].abs() > 90.0 {

@@ -16,7 +16,7 @@ const STARTS: usize = 4;
 const PRIOR: f64 = 0.02;
 /// The same for the light on a surface.
 const LIGHT_PRIOR: f64 = 1e-4;
-/// A plateau: so many steps in which the loss falls by less than this fraction.
+/// A plateau: N steps in which the loss falls by less than this fraction.
 const PLATEAU: Plateau = Plateau { patience: 50, improvement: 1e-3 };
 
 #[derive(Args, Debug)]
@@ -41,13 +41,13 @@ pub(super) struct Settings {
     #[arg(long, value_name = "RATE[:LAST]", value_parser = rate)]
     rate: Option<(f64, Option<f64>)>,
 
-    /// Part of the weight that goes by light, 0 to 1, with the objective energy: the more, the better suns and lamps and
-    /// the worse everything else [default: 0.05]
+    /// Energy weight of the objective energy, the part of the weight that goes by light, 0 to 1: the more, the better
+    /// suns and lamps and the worse everything else [default: 0.05]
     #[arg(long, value_name = "PART")]
     share: Option<f64>,
 
     /// Weight of the model's prior over latents; 0 turns it off [default: 0.0001, 0.00001 for more than 16 vectors, and
-    /// 0.02 where part of the sphere is unknown; with the articles' presets 0]
+    /// 0.02 where part of the sphere is unknown; with the presets of the papers 0]
     #[arg(long, value_name = "WEIGHT")]
     prior: Option<f64>,
 
@@ -83,11 +83,11 @@ enum Preset {
     #[default]
     Thorough,
     /// The same, weighted a little (5 %) by the light that comes from there: the sun stands where it belongs, for light
-    /// that shall fall on something
+    /// that is to illuminate something
     Energy,
     /// What is seen on a screen under the picture's own white; highlights beyond it are left alone
     Display,
-    /// The article's helper: 2000 steps from 1e-2 to 2e-3, unweighted, without a prior
+    /// The reference implementation's: 2000 steps from 1e-2 to 2e-3, unweighted, without a prior
     Reference,
     /// RENI++'s evaluation: cosine and scale-invariant error, 2500 steps
     #[cfg(feature = "learn")]
@@ -121,7 +121,7 @@ enum ObjectiveName {
     /// RENI++'s: cosine and scale-invariant error
     #[cfg(feature = "learn")]
     CosineScale,
-    /// The training losses of the article: gradients on several scales, scale-invariant error, colour
+    /// The training losses of the paper: gradients on several scales, scale-invariant error, colour
     #[cfg(feature = "learn")]
     Training,
 }
@@ -133,7 +133,7 @@ enum MethodName {
     Auto,
     /// Damped Gauss-Newton steps to the minimum next to the start; for objectives that look at each pixel alone
     LevenbergMarquardt,
-    /// As the articles have it
+    /// As in the papers
     Adam,
 }
 
@@ -211,7 +211,7 @@ impl Settings {
             (Some(part), Objective::Energy { share }) => *share = part,
             (Some(_), _) => {
                 bail!(
-                    "--share: only the objective energy weighs by light; add --preset energy, or leave it out"
+                    "--share: only the objective energy has an energy weight; add --preset energy, or leave it out"
                 )
             }
             (None, _) => {}
@@ -276,7 +276,7 @@ impl Settings {
 fn rate(text: &str) -> Result<(f64, Option<f64>), String> {
     let number = |t: &str| match t.trim().parse::<f64>() {
         Ok(v) if v.is_finite() && v > 0.0 => Ok(v),
-        _ => Err(format!("'{t}' is no learning rate: give a number above 0, or two as 0.05:0.002")),
+        _ => Err(format!("'{t}' is not a learning rate: give a number above 0, or two as 0.05:0.002")),
     };
     match text.split_once(':') {
         Some((first, last)) => Ok((number(first)?, Some(number(last)?))),

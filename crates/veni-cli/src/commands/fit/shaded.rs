@@ -18,7 +18,7 @@ use crate::numbers::{albedo, fraction, lights, shininess};
 use crate::output::CAMERA;
 
 #[derive(Args, Debug)]
-#[command(next_help_heading = "Shaded pictures")]
+#[command(next_help_heading = "Rendered pictures")]
 pub(super) struct Shaded {
     /// The picture shows a surface with these normals (world axes, z up, as 'render-probe --normals' writes them):
     /// find the light on it
@@ -50,13 +50,13 @@ pub(super) struct Shaded {
     shading: Shading,
 }
 
-/// Physics, or the authors' program.
+/// Physics, or the reference implementation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Shading {
     /// Radiance x reflectance x cosine x solid angle; robust error of log radiance
     #[default]
     Physical,
-    /// The authors': no solid angles, exposure exponentiated twice, 100 x mean absolute log error
+    /// The reference implementation's: no solid angles, exposure exponentiated twice, 100 x mean absolute log error
     Reference,
 }
 
@@ -142,7 +142,7 @@ impl Shaded {
         Ok(map.normals().iter().map(against).collect())
     }
 
-    /// Brings each start to the picture's mean brightness; the authors' starts stay where they are.
+    /// Brings each start to the picture's mean brightness; the reference implementation's starts stay where they are.
     pub(super) fn exposed(
         &self,
         image: &ShadedImage,

@@ -78,7 +78,7 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     Ok(facts)
 }
 
-/// The options that differ from the article's network, as they are written in a model file.
+/// The options that differ from the paper's network, as they are written in a model file.
 fn options(decoder: &DecoderConfig) -> String {
     let sizes = ["hidden", "layers", "heads", "vn_relu"];
     let written = json!(decoder);

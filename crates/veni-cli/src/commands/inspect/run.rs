@@ -67,7 +67,7 @@ fn read_lines(path: &Path) -> Result<Vec<Value>> {
         match serde_json::from_str(line) {
             Ok(value) => values.push(value),
             Err(_) if at + 1 == lines.len() => {}
-            Err(e) => bail!("{}: line {} is no JSON ({e}); the file is damaged", path.display(), at + 1),
+            Err(e) => bail!("{}: line {} is not JSON ({e}); the file is damaged", path.display(), at + 1),
         }
     }
     Ok(values)

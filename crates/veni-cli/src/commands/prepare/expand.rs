@@ -197,5 +197,5 @@ impl From<Scale> for NetworkScale {
 
 fn gamma(text: &str) -> Result<f32, String> {
     let gamma = text.parse().ok().filter(|g| (0.5..=4.0).contains(g));
-    gamma.ok_or_else(|| format!("'{text}' is no gamma: give a number from 0.5 to 4, like 2.2"))
+    gamma.ok_or_else(|| format!("'{text}' is not a gamma: give a number from 0.5 to 4, like 2.2"))
 }

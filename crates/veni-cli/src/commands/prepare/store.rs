@@ -83,7 +83,7 @@ impl Settings {
 
 impl Store {
     /// Opens the folder, or makes it. Refuses one that holds other things or was made with other settings; with
-    /// `force` it removes what an earlier run wrote and begins anew.
+    /// `force` it removes what an earlier run wrote and starts over.
     pub(super) fn open(root: &Path, settings: &Settings, force: bool, shard: Shard) -> Result<Self> {
         let own = root.join(".prepare");
         if root.exists() && !root.is_dir() {
@@ -116,11 +116,11 @@ impl Store {
         match fs::read(&file) {
             Ok(bytes) => {
                 let old: Settings = serde_json::from_slice(&bytes)
-                    .with_context(|| format!("{}: damaged; begin anew with --force", file.display()))?;
+                    .with_context(|| format!("{}: damaged; start over with --force", file.display()))?;
                 if old != *settings {
                     bail!(
                         "{}: was prepared with other settings (--size {}x{}, expand {}); give them again, name another folder, or \
-                         begin anew with --force",
+                         start over with --force",
                         root.display(),
                         old.width,
                         old.height,
@@ -144,7 +144,7 @@ impl Store {
         logs.sort();
         for log in &logs {
             let text = fs::read_to_string(log).map_err(|e| Error::io(log, "read", e))?;
-            // a line that a stopped run left unfinished is no record; its file is examined again
+            // a line that a stopped run left unfinished is not a record; its file is examined again
             for record in text.lines().filter_map(|line| serde_json::from_str::<Record>(line).ok()) {
                 records.insert(record.key.clone(), record);
             }
@@ -154,13 +154,13 @@ impl Store {
         if let Ok(file) = &mut log
             && file.metadata().is_ok_and(|m| m.len() > 0)
         {
-            // ends a torn line; an empty one is no record either
+            // ends a torn line; an empty one is not a record either
             file.write_all(b"\n").map_err(|e| Error::io(&path, "write", e))?;
         }
         let log = log.map_err(|e| Error::io(&path, "open", e))?;
         let plan = match fs::read(own.join("plan.json")) {
             Ok(bytes) => serde_json::from_slice(&bytes)
-                .with_context(|| format!("{}: damaged plan.json; begin anew with --force", own.display()))?,
+                .with_context(|| format!("{}: damaged plan.json; start over with --force", own.display()))?,
             Err(_) => BTreeMap::new(),
         };
         Ok(Self { root: root.to_path_buf(), records, log, log_path: path, plan })

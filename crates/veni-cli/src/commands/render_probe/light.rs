@@ -25,7 +25,7 @@ pub(super) fn from_file(
         return decode(&loaded, &latent, grid, turn);
     }
     if veni_image::attributes(path).map_err(with_remedy)?.contains_key(CUBE_FACES) {
-        bail!("{}: a cube map is no panorama; name an equirectangular image", path.display());
+        bail!("{}: a cube map is not a panorama; name an equirectangular image", path.display());
     }
     let image = source::panorama(path, report)?;
     Ok(image.resample_turned(grid, turn).into_pixels())

@@ -70,7 +70,7 @@ fn read(path: &Path, up: Up) -> Result<Mesh> {
         ignore_lines: true,
         ..Default::default()
     };
-    // materials are not used: a missing library is no reason to fail
+    // materials are not used: a missing library is not a reason to fail
     let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials)
         .map_err(|e| anyhow!("{}: {}", path.display(), explain(e)))?;

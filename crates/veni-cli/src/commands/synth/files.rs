@@ -64,7 +64,7 @@ impl Files {
             return Ok(false);
         }
         bail!(
-            "{}: is not of this set (another seed, size or option); name another folder, or --force replaces it",
+            "{}: does not belong to this data set (another seed, size or option); name another folder, or --force replaces it",
             path.display()
         )
     }

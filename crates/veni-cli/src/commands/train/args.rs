@@ -22,7 +22,7 @@ use crate::part::fold;
         updates, panoramas, learning rates, losses and augmentation of its own, and all are validated on the \
         panoramas of --data.\n\n\
         More panoramas than --set data.memory_mib=4096 holds are kept in a file without a name beside RUN, or in the \
-        folder of --set data.scratch=DIR, and read from there; both may be given anew with --resume.\n\n\
+        folder of --set data.scratch=DIR, and read from there; both may be given again with --resume.\n\n\
         Ctrl-C writes a checkpoint and ends; a second one ends at once. A run that was stopped or killed continues \
         with --resume from its last checkpoint as if nothing had happened, to the bit on the same machine.",
     after_help = "Examples:\n  \
@@ -58,7 +58,7 @@ pub(crate) struct Train {
     #[arg(long, short, value_name = "RUN")]
     pub(super) out: PathBuf,
 
-    /// Begin with the weights of this model (or run) instead of random ones; a model without encoder, or --system
+    /// Initialise with the weights of this model (or run) instead of random ones; a model without encoder, or --system
     /// reni++, takes the decoder alone
     #[arg(long, value_name = "MODEL")]
     pub(super) init: Option<PathBuf>,
@@ -84,7 +84,7 @@ pub(crate) struct Train {
     #[arg(long, value_enum, conflicts_with = "config")]
     pub(super) preset: Option<PresetName>,
 
-    /// Number N of latent vectors; the article's D is 3N [default: 9]
+    /// Number N of latent vectors; the latent dimension D is 3N [default: 9]
     #[arg(long, short = 'n', value_name = "N", conflicts_with = "config")]
     pub(super) latent_vectors: Option<usize>,
 
@@ -123,7 +123,7 @@ pub(crate) struct Train {
     #[arg(long, conflicts_with = "force")]
     pub(super) resume: bool,
 
-    /// Begin anew in place of the run in RUN, once the data is known to be good
+    /// Start over in place of the run in RUN, once the data is known to be good
     #[arg(long, short)]
     pub(super) force: bool,
 }
@@ -131,7 +131,7 @@ pub(crate) struct Train {
 /// The systems by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SystemName {
-    /// The auto-encoder of the article
+    /// The auto-encoder of the paper
     #[default]
     Veni,
     /// The auto-decoder that it is compared with: no encoder, a latent for each training panorama
@@ -146,7 +146,7 @@ pub(crate) enum PresetName {
     Tiny,
     /// As good as an hour or two on two CPU cores can buy
     Small,
-    /// The article's sizes, for a graphics card
+    /// The paper's sizes, for a graphics card
     Paper,
 }
 

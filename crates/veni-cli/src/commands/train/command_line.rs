@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use veni_light::model::Model;
 
 use super::args::{SystemName, Train};
-use super::holding::held_by;
+use super::pixel_storage::storage_key;
 
 impl Train {
     /// The command that repeats this run, for the model file. A model is given away: of a path only its last name
@@ -52,7 +52,7 @@ impl Train {
         words.extend(self.devices.iter().map(|devices| format!("--devices {devices}")));
         words.extend(self.mixed_precision.then(|| "--mixed-precision".to_owned()));
         // where panoramas were kept meanwhile changes nothing, and is a path of this machine
-        let set = self.set.iter().filter(|set| held_by(set) != Some("scratch"));
+        let set = self.set.iter().filter(|set| storage_key(set) != Some("scratch"));
         words.extend(set.map(|set| format!("--set {}", shell_word(Path::new(set)))));
         words.push(format!("--out {}", last(&self.out)));
         words.join(" ")

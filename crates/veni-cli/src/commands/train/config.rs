@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use veni_light::Error;
 use veni_light::model::ModelKind;
-use veni_core::train::config::{DecoderBy, TrainConfig};
+use veni_core::train::config::{DecoderBackend, TrainConfig};
 use veni_core::train::init::InitConfig;
 use veni_core::train::presets::Preset;
 
@@ -48,7 +48,7 @@ impl Train {
                      flex and ndarray"
                 );
             }
-            config.decoder_by = DecoderBy::KernelsBfloat16;
+            config.decoder_backend = DecoderBackend::KernelsBfloat16;
         }
         if let Some(steps) = self.steps {
             config = config.with_overrides(&[format!("steps={steps}")])?;
@@ -73,7 +73,7 @@ impl Train {
         } else if !self.names_devices() {
             config.share_threads(rayon::current_num_threads());
         }
-        if self.mixed_precision && config.decoder_by != DecoderBy::KernelsBfloat16 {
+        if self.mixed_precision && config.decoder_backend != DecoderBackend::KernelsBfloat16 {
             bail!("--mixed-precision: a --set takes it back; leave one of them out");
         }
         config.check()?;

@@ -33,7 +33,7 @@ impl Train {
         }
         if !self.force {
             bail!(
-                "{}: holds a run already; --resume continues it, --force begins anew in its place",
+                "{}: holds a run already; --resume continues it, --force starts over in its place",
                 out.display()
             );
         }

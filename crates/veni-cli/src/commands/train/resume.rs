@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use veni_data::Holding;
+use veni_data::PixelStorage;
 
 use super::args::Train;
 use super::config::read;
-use super::holding::held_by;
+use super::pixel_storage::storage_key;
 
 impl Train {
-    /// With `--resume`: whatever else was typed must be what the run was begun with, but for where its panoramas are held.
+    /// With `--resume`: whatever else was typed must be what the run was begun with, but for where its panoramas are kept.
     pub(super) fn check_same(&self, stored: &Path) -> Result<()> {
         let described = !self.data.is_empty() || self.config.is_some();
         let begun = self.init.is_some() || self.pretrains() || self.pretrain_steps.is_some();
@@ -25,13 +25,13 @@ impl Train {
             || self.device.is_some()
             || self.devices.is_some()
             || self.mixed_precision
-            || self.set.iter().any(|set| held_by(set).is_none());
+            || self.set.iter().any(|set| storage_key(set).is_none());
         if !described && !changed {
             return Ok(());
         }
         if !described {
             bail!(
-                "{}: a run goes on with its own settings: leave the other options out, or give --data and all that \
+                "{}: a run continues with its own settings: leave the other options out, or give --data and all that \
                  it was begun with",
                 self.out.display()
             );
@@ -45,8 +45,9 @@ impl Train {
             // another machine may have other threads to share
             new.devices.clone_from(&old.devices);
         }
-        let holding = self.holding(stored)?;
-        let (old, new) = (old.held(&holding).to_toml()?, new.held(&holding).to_toml()?);
+        let storage = self.pixel_storage(stored)?;
+        let (old, new) =
+            (old.with_pixel_storage(&storage).to_toml()?, new.with_pixel_storage(&storage).to_toml()?);
         let differing = old.lines().zip(new.lines()).find(|(a, b)| a != b);
         match differing {
             Some((old, new)) => bail!(
@@ -64,12 +65,12 @@ impl Train {
         }
     }
 
-    /// Where `--set` says that the panoramas are held from now on.
-    pub(super) fn holding(&self, stored: &Path) -> Result<Holding> {
-        let set: Vec<_> = self.set.iter().filter(|set| held_by(set).is_some()).collect();
+    /// Where `--set` says that the panoramas are kept from now on.
+    pub(super) fn pixel_storage(&self, stored: &Path) -> Result<PixelStorage> {
+        let set: Vec<_> = self.set.iter().filter(|set| storage_key(set).is_some()).collect();
         let data = read(stored)?.with_overrides(&set).context("--set")?.data;
-        let given = |key| set.iter().any(|set| held_by(set) == Some(key));
-        Ok(Holding {
+        let given = |key| set.iter().any(|set| storage_key(set) == Some(key));
+        Ok(PixelStorage {
             memory_mib: given("memory_mib").then_some(data.memory_mib),
             scratch: given("scratch").then_some(data.scratch).flatten(),
         })

@@ -1,6 +1,6 @@
 //! What types cannot say about a configuration.
 
-use super::{DecoderBy, LossGrid, TrainConfig};
+use super::{DecoderBackend, LossGrid, TrainConfig};
 use veni_data::AugmentConfig;
 use veni_light::model::ModelKind;
 use crate::{Error, Result};
@@ -25,7 +25,7 @@ impl TrainConfig {
             return Err(Error::invalid("batch = 0: needs at least one panorama per step"));
         }
         self.check_parts()?;
-        if self.decoder_by == DecoderBy::KernelsBfloat16 {
+        if self.decoder_backend == DecoderBackend::KernelsBfloat16 {
             self.model.decoder.check_folds().map_err(|_| {
                 Error::invalid(
                     "decoder_by = kernels-bfloat16: kernels compute the paper's decoder only (attention, vn, so2); take \

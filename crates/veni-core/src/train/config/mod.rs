@@ -11,7 +11,7 @@ mod tests;
 
 use serde::{Deserialize, Serialize};
 
-pub use device::{DecoderBy, DeviceKind, Devices, Opened};
+pub use device::{DecoderBackend, DeviceKind, Devices, Opened};
 pub use loss_grid::LossGrid;
 pub use report::{ReportConfig, Stored};
 pub use stage::{Stage, StageConfig};
@@ -48,10 +48,10 @@ pub struct TrainConfig {
     /// processor every number is a share of its threads.
     #[serde(default, skip_serializing_if = "is_first")]
     pub devices: Devices,
-    /// What computes the decoder and its gradients. A file that does not say it means what is best on its device
-    /// ([`DeviceKind::decoder_by`]).
-    #[serde(default)]
-    pub decoder_by: DecoderBy,
+    /// The decoder backend. A file that does not say it means what is best on its device
+    /// ([`DeviceKind::decoder_backend`]).
+    #[serde(default, rename = "decoder_by")]
+    pub decoder_backend: DecoderBackend,
     /// Decay of the averaged weights, which are validated and become the model; 0 takes the last weights.
     pub ema_decay: f64,
     /// The network.
@@ -123,7 +123,7 @@ impl TrainConfig {
     pub fn from_toml(text: &str) -> Result<Self> {
         let mut config: Self = toml::from_str(text).map_err(|e| Error::invalid(e.to_string()))?;
         if toml::from_str::<toml::Table>(text).is_ok_and(|table| !table.contains_key("decoder_by")) {
-            config.decoder_by = config.device.decoder_by();
+            config.decoder_backend = config.device.decoder_backend();
         }
         config.check()?;
         Ok(config)
@@ -141,7 +141,8 @@ impl TrainConfig {
     /// Another device, the first of its kind, and with it what computes the decoder best there.
     pub fn set_device(&mut self, device: DeviceKind) {
         if self.device != device {
-            (self.device, self.devices, self.decoder_by) = (device, Devices::default(), device.decoder_by());
+            (self.device, self.devices, self.decoder_backend) =
+                (device, Devices::default(), device.decoder_backend());
         }
     }
 

@@ -41,7 +41,7 @@ impl TrainConfig {
             let mut other = self.clone();
             other.set_device(config.device);
             if !named.contains(&"decoder_by") {
-                config.decoder_by = other.decoder_by;
+                config.decoder_backend = other.decoder_backend;
             }
             if !named.contains(&"devices") {
                 config.devices = other.devices;

@@ -25,7 +25,7 @@ use toml::{Table, Value};
 
 use super::TrainConfig;
 use super::overrides::float_where_float;
-use veni_data::Holding;
+use veni_data::PixelStorage;
 use veni_light::model::ModelKind;
 use crate::{Error, Result};
 
@@ -88,14 +88,14 @@ impl TrainConfig {
         Ok(stages)
     }
 
-    /// The same run with its panoramas, those of all stages too, held as `holding` says.
+    /// The same run with its panoramas, those of all stages too, kept as `storage` says.
     #[must_use]
-    pub fn held(mut self, holding: &Holding) -> Self {
-        let Holding { memory_mib, scratch } = holding;
+    pub fn with_pixel_storage(mut self, storage: &PixelStorage) -> Self {
+        let PixelStorage { memory_mib, scratch } = storage;
         let given = [memory_mib.is_some(), scratch.is_some()];
         for stage in &mut self.stage {
             if let Some(Value::Table(data)) = stage.changes.get_mut("data") {
-                for (key, _) in Holding::KEYS.iter().zip(given).filter(|(_, given)| *given) {
+                for (key, _) in PixelStorage::KEYS.iter().zip(given).filter(|(_, given)| *given) {
                     data.remove(*key);
                 }
             }

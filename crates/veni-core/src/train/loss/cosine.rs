@@ -18,7 +18,7 @@ fn linear(log_radiance: Tensor<4>) -> Tensor<4> {
     (log_radiance - largest).exp()
 }
 
-/// The authors' form: mean over pixels of 1 − mask·cos(P, I) of the log values, ε = 1e-8 on the product of
+/// The reference implementation's form: mean over pixels of 1 − mask·cos(P, I) of the log values, ε = 1e-8 on the product of
 /// the lengths. `[B, H, W, 3]` → `[1]`.
 pub fn reference(prediction: Tensor<4>, target: Tensor<4>, mask: Tensor<4>) -> Tensor<1> {
     ((cosine(prediction, target) * mask).neg() + 1.0).mean()

@@ -85,8 +85,8 @@ impl Operator {
     }
 }
 
-/// The authors' module on single-channel planes `[M, rows, columns]` → `[1]`: mean absolute difference of the
-/// filtered planes, averaged over the operator's stencils and the scales; each scale takes every second
+/// The reference implementation's module on single-channel planes `[M, rows, columns]` → `[1]`: mean absolute
+/// difference of the filtered planes, averaged over the operator's stencils and the scales; each scale takes every second
 /// row and column of the one before, nothing wraps. With `normalise` both inputs are first made free of
 /// shift and scale, (x − median)/mean|x − median| over everything.
 pub fn reference_planes(
@@ -123,8 +123,9 @@ pub fn reference_planes(
     Tensor::cat(terms, 0).sum() / count as f64
 }
 
-/// The authors' loss on images: their mask multiplied into both before filtering (so that its slope enters),
-/// rows and columns exchanged (so that their second stencil acts along the horizon). `[B, H, W, 3]` → `[1]`.
+/// The reference implementation's loss on images: their mask multiplied into both before filtering (so that its
+/// gradient enters), rows and columns exchanged (so that their second stencil acts along the horizon). `[B, H, W, 3]` →
+/// `[1]`.
 pub fn reference(prediction: Tensor<4>, target: Tensor<4>, scales: usize) -> Tensor<1> {
     let [batch, height, width, channels] = prediction.dims();
     let mask = rows::reference(height, &prediction.device());

@@ -2,7 +2,7 @@
 //!
 //! Images are log radiance `[B, H, W, 3]`, row 0 on top. Every term exists in two forms. The corrected one,
 //! the default, does what the paper describes and is what its name says; the reference form reproduces
-//! the authors' program number for number. Where they differ is said at each term.
+//! the reference implementation number for number. Where they differ is said at each term.
 
 pub mod cosine;
 pub mod kld;

@@ -71,7 +71,7 @@ fn white_point(target: &Tensor<4>) -> Tensor<4> {
 fn display(log_radiance: Tensor<4>, white: Tensor<4>) -> Tensor<4> {
     let x = (log_radiance - white).clamp_max(0.0).exp();
     let linear = x.clone() * 12.92;
-    // The power's slope is infinite at 0, where it is not used: guarded, lest the unused branch give NaN.
+    // The power's derivative is infinite at 0, where it is not used: guarded, lest the unused branch give NaN.
     let curved = x.clone().clamp_min(0.003_130_8).powf_scalar(1.0 / 2.4) * 1.055 - 0.055;
     curved.mask_where(x.lower_elem(0.003_130_8), linear)
 }

@@ -11,7 +11,7 @@ pub fn solid_angle(height: usize, device: &Device) -> Tensor<4> {
     rows(sines.into_iter().map(|s| s / mean), device)
 }
 
-/// The authors' mask: min(sin(π r/(H−1)) + 0.001, 1), whose ends are the poles themselves: [1, H, 1, 1].
+/// The reference implementation's mask: min(sin(π r/(H−1)) + 0.001, 1), whose ends are the poles themselves: [1, H, 1, 1].
 pub fn reference(height: usize, device: &Device) -> Tensor<4> {
     let last = (height.max(2) - 1) as f64;
     rows((0..height).map(|r| ((PI * r as f64 / last).sin() + 0.001).min(1.0)), device)

@@ -22,7 +22,7 @@ pub fn level(prediction: Tensor<4>, target: Tensor<4>, weights: Tensor<4>) -> Te
     (mean.clone() * mean).mean()
 }
 
-/// The authors' form, per image and channel: mean(R²) − mean(R)², R = mask·(P − I), over the pixels.
+/// The reference implementation's form, per image and channel: mean(R²) − mean(R)², R = mask·(P − I), over the pixels.
 /// With the mask inside it responds to a constant factor too. `[B, H, W, 3]` → `[B, 3]`.
 pub fn reference(prediction: Tensor<4>, target: Tensor<4>, mask: Tensor<4>) -> Tensor<2> {
     let error = (prediction - target) * mask;

@@ -10,8 +10,8 @@ pub type Stencil = &'static [([f64; 3], [f64; 3])];
 pub const SCHARR_HORIZONTAL: Stencil = &[([3.0, 10.0, 3.0], [-1.0, 0.0, 1.0])];
 /// Scharr's derivative along a column.
 pub const SCHARR_VERTICAL: Stencil = &[([-1.0, 0.0, 1.0], [3.0, 10.0, 3.0])];
-/// What the authors' program has in place of [`SCHARR_VERTICAL`]: [−3 10 −3 / 0 0 0 / 3 10 3]. Its entries
-/// sum to 20, so it is no derivative.
+/// What the reference implementation has in place of [`SCHARR_VERTICAL`]: [−3 10 −3 / 0 0 0 / 3 10 3]. Its entries
+/// sum to 20, so it is not a derivative.
 pub const REFERENCE_VERTICAL: Stencil =
     &[([1.0, 0.0, 0.0], [-3.0, 10.0, -3.0]), ([0.0, 0.0, 1.0], [3.0, 10.0, 3.0])];
 /// The five-point Laplacian.

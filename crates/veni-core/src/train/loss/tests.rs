@@ -98,7 +98,7 @@ fn mage_measures_slopes() {
     let mage = mage::Mage::new(1, H, W, &Device::flex());
     let value = number(mage.loss(slope.clone(), slope.zeros_like()));
     assert!((value - 0.5 * 32.0 * 0.01).abs() < 1e-5, "{value}");
-    // The authors' pair answers to a mere level with 20 × it, halved by the average of the two.
+    // The reference implementation's pair answers to a mere exposure with 20 × it, halved by the average of the two.
     let level = Tensor::<3>::full([1, H, W], 0.1, &Device::flex());
     let theirs = mage::reference_planes(level.clone(), level.zeros_like(), mage::Operator::Scharr, 1, false);
     assert!((number(theirs) - 0.5 * 20.0 * 0.1).abs() < 1e-5);

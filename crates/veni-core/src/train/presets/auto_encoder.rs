@@ -3,7 +3,7 @@
 use veni_data::{AugmentConfig, DataConfig};
 use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 use crate::train::config::{
-    DecoderBy, DeviceKind, Devices, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig,
+    DecoderBackend, DeviceKind, Devices, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig,
 };
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
@@ -51,7 +51,7 @@ pub(super) fn small(latent_vectors: usize) -> TrainConfig {
         order: Order::Shuffle,
         device: DeviceKind::Flex,
         devices: Devices::default(),
-        decoder_by: DecoderBy::Kernels,
+        decoder_backend: DecoderBackend::Kernels,
         ema_decay: 0.999,
         model: ModelConfig {
             kind: ModelKind::Veni,
@@ -70,7 +70,7 @@ pub(super) fn small(latent_vectors: usize) -> TrainConfig {
         data: DataConfig::default(),
         augment: varied(),
         loss_grid: LossGrid::Strided { factor: 2 },
-        // The gradient term is lighter than the paper's: 27 numbers cannot follow edges. What a viewer sees
+        // The gradient term is lighter than the paper's: a latent of dimension 27 cannot follow edges. What a viewer sees
         // (clamped, tonemapped) is asked for directly, which covers most of the colour too.
         loss: LossConfig {
             mage: WeightSchedule::Constant(0.1),

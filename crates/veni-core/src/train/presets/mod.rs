@@ -56,7 +56,7 @@ impl Preset {
 const FINE: f64 = 10.0;
 
 impl TrainConfig {
-    /// The same run behind a stage `pretrain` of `steps` updates on other panoramas and so many generated scenes; its own
+    /// The same run behind a stage `pretrain` of `steps` updates on other panoramas and this many generated scenes; its own
     /// updates become the stage `finetune`, with a tenth of the learning rates.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write;
 
 use super::*;
-use veni_data::{Heard, Holding};
+use veni_data::{PixelStorage, ProgressCallback};
 use veni_light::model::Model;
 use veni_light::output::{Overwrite, existing_above, write_atomic};
 use crate::train::init::{self, InitConfig};
@@ -23,14 +23,19 @@ impl Trainer {
     }
 
     /// A run that is yet to [`begin`](Self::begin): its data and the weights that it starts from are read, nothing is
-    /// written. `heard` is told of the data.
+    /// written. `progress` is called while the data is read.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the configuration does not fit; what reading data and weights says.
-    pub fn prepare(folder: &Path, mut config: TrainConfig, command: &str, heard: Heard<'_>) -> Result<Self> {
+    pub fn prepare(
+        folder: &Path,
+        mut config: TrainConfig,
+        command: &str,
+        progress: ProgressCallback<'_>,
+    ) -> Result<Self> {
         config.check()?;
         let init = config.init.as_mut().map(InitConfig::open).transpose()?;
-        Self::fresh(folder, config, command, init.as_ref(), 0, heard)
+        Self::fresh(folder, config, command, init.as_ref(), 0, progress)
     }
 
     /// Makes the run's folder: from here on it can be continued.
@@ -63,18 +68,23 @@ impl Trainer {
     /// # Errors
     /// [`Error::Io`] or [`Error::Invalid`] if `config.toml` or the checkpoint cannot be read or do not fit together.
     pub fn resume(folder: &Path, command: &str) -> Result<Self> {
-        Self::resume_heard(folder, command, &Holding::default(), &|_, _| {})
+        Self::resume_with(folder, command, &PixelStorage::default(), &|_, _| {})
     }
 
-    /// [`Trainer::resume`], with panoramas held as `holding` says (`config.toml` keeps what it says of that), telling how far
-    /// reading the data has come.
+    /// [`Trainer::resume`], with panoramas kept as `storage` says (`config.toml` keeps what it says of that), reporting the
+    /// progress of reading the data.
     ///
     /// # Errors
     /// As [`Trainer::resume`].
-    pub fn resume_heard(folder: &Path, command: &str, holding: &Holding, heard: Heard<'_>) -> Result<Self> {
+    pub fn resume_with(
+        folder: &Path,
+        command: &str,
+        storage: &PixelStorage,
+        progress: ProgressCallback<'_>,
+    ) -> Result<Self> {
         let path = folder.join("config.toml");
         let text = fs::read_to_string(&path).map_err(|e| Error::io(&path, "read", e))?;
-        let config = TrainConfig::from_toml(&text).map_err(|e| e.in_file(&path))?.held(holding);
+        let config = TrainConfig::from_toml(&text).map_err(|e| e.in_file(&path))?.with_pixel_storage(storage);
         for left in leftovers(folder)? {
             fs::remove_file(&left).map_err(|e| Error::io(&left, "remove", e))?;
         }
@@ -82,13 +92,13 @@ impl Trainer {
         let state = if path.exists() { Some(checkpoint::load(&path)?) } else { None };
         if let (None, Some(init)) = (&state, &config.init) {
             return Err(Error::invalid(format!(
-                "{}: is missing, and with it the weights that the run took from {}; begin the run anew",
+                "{}: is missing, and with it the weights that the run took from {}; start the run over",
                 path.display(),
                 init.model.display()
             )));
         }
         let done = state.as_ref().map_or(0, |(_, info)| info.step);
-        let mut trainer = Self::fresh(folder, config, command, None, done, heard)?;
+        let mut trainer = Self::fresh(folder, config, command, None, done, progress)?;
         trainer.make_folders()?;
         if let Some((state, info)) = state {
             trainer.optimiser.restore(state, info.step).map_err(|e| e.in_file(&path))?;
@@ -105,16 +115,16 @@ impl Trainer {
         command: &str,
         init: Option<&Model>,
         done: u64,
-        heard: Heard<'_>,
+        progress: ProgressCallback<'_>,
     ) -> Result<Self> {
         let opened = config.device.open_all(&config.devices)?;
         let devices: Vec<_> = opened.into_iter().map(|opened| opened.device.autodiff()).collect();
-        config.decoder_by.check()?;
+        config.decoder_backend.check()?;
         let scratch = existing_above(folder);
-        let splits = Splits::open_heard(&config.data, config.seed, scratch, heard)?;
+        let splits = Splits::open_with_progress(&config.data, config.seed, scratch, progress)?;
         let running = |stage: Stage| -> Result<Running> {
             let needed = stage.own_data && stage.end() > done;
-            let data = needed.then(|| own_data(&stage, &splits.val, scratch, heard)).transpose()?;
+            let data = needed.then(|| own_data(&stage, &splits.val, scratch, progress)).transpose()?;
             Ok(Running { stage, data })
         };
         let stages = config.stages()?.into_iter().map(running).collect::<Result<_>>()?;
@@ -152,11 +162,12 @@ fn refuse_used(folder: &Path) -> Result<()> {
 const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
 
 /// The training panoramas of a stage, without those that validate the run.
-fn own_data(stage: &Stage, val: &Dataset, scratch: &Path, heard: Heard<'_>) -> Result<Dataset> {
+fn own_data(stage: &Stage, val: &Dataset, scratch: &Path, progress: ProgressCallback<'_>) -> Result<Dataset> {
     let name = stage.name.as_deref().unwrap_or_default();
     let named = |e: Error| Error::invalid(format!("stage {name}: {}", e.with_source()));
-    let train =
-        Splits::open_heard(&stage.config.data, stage.config.seed, scratch, heard).map_err(named)?.train;
+    let train = Splits::open_with_progress(&stage.config.data, stage.config.seed, scratch, progress)
+        .map_err(named)?
+        .train;
     let file = |path: &Path| fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     let held_out: HashSet<_> = val.items().iter().map(|item| file(&item.path)).collect();
     let kept = train.retain(|item| !held_out.contains(&file(&item.path)));

@@ -182,7 +182,7 @@ impl Trainer {
     }
 
     /// Latents and variances of the training panoramas and `copies` augmented copies of each; of a large set of
-    /// [`PRIOR_PANORAMAS`], evenly spread. Generated scenes count only where there is nothing else: a random sky shall
+    /// [`PRIOR_PANORAMAS`], evenly spread. Generated scenes count only where there is nothing else: a random sky must
     /// be like the photographed ones.
     fn encoded(&self, veni: &Veni, copies: usize) -> Result<(Vec<Latent>, Vec<Vec<f32>>)> {
         let train = &self.splits.train;

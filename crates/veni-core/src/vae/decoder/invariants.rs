@@ -1,4 +1,5 @@
-//! What the network is told about the latent apart from its products with the direction. MODEL (17).
+//! The latent's condition features: what the network is conditioned on apart from its products with the direction.
+//! MODEL (17).
 
 use super::Condition;
 use super::input::encode;
@@ -19,20 +20,20 @@ pub(super) fn vector(config: &DecoderConfig, condition: Option<&Condition>, late
         x.reshape([batch, 1, tokens * width])
     };
     let gram = config.invariance == Invariance::GramMatrix && config.equivariance == Equivariance::So2;
-    let told = if gram {
+    let features = if gram {
         let heights = latent.clone().narrow(2, 2, 1).reshape([batch, 1, n]);
         Tensor::cat(vec![flat(inner_products(latent.narrow(2, 0, 2))), heights], 2)
     } else {
         flat(of_each(config, condition, latent))
     };
-    let told = if config.encodes_condition() { encode(told) } else { told };
-    told.squeeze_dim(1)
+    let features = if config.encodes_condition() { encode(features) } else { features };
+    features.squeeze_dim(1)
 }
 
 /// The same by latent vector: [B, N, 3] → [B, N, C/N]. With a Gram matrix each has its row, and its z_z.
 pub(super) fn tokens(config: &DecoderConfig, condition: Option<&Condition>, latent: Tensor<3>) -> Tensor<3> {
-    let told = of_each(config, condition, latent);
-    if config.encodes_condition() { encode(told) } else { told }
+    let features = of_each(config, condition, latent);
+    if config.encodes_condition() { encode(features) } else { features }
 }
 
 fn of_each(config: &DecoderConfig, condition: Option<&Condition>, latent: Tensor<3>) -> Tensor<3> {

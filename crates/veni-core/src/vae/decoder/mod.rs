@@ -91,10 +91,10 @@ impl Decoder {
     /// If `config` is inconsistent ([`ModelConfig::validate`](veni_light::model::ModelConfig::validate)).
     pub fn new(config: &DecoderConfig, latent_vectors: usize, rng: &mut Stream, device: &Device) -> Self {
         let (n, hidden, conditioning) = (latent_vectors, config.hidden, config.conditioning);
-        let (directional, told) = (config.direction_inputs(n), config.condition_inputs(n));
+        let (directional, features) = (config.direction_inputs(n), config.condition_inputs(n));
         let condition = config.vn_channels().map(|c| Condition::new(config.vn_relu, c, rng, device));
         let tokens =
-            (conditioning == Conditioning::Tokens).then(|| Tokens::new(n, told / n, hidden, rng, device));
+            (conditioning == Conditioning::Tokens).then(|| Tokens::new(n, features / n, hidden, rng, device));
         let mapping = match conditioning {
             Conditioning::Film => sine::mapping(config, n, rng, device),
             _ => Vec::new(),
@@ -102,13 +102,13 @@ impl Decoder {
         let input = match conditioning {
             Conditioning::Attention | Conditioning::Tokens => Linear::new(directional, hidden, rng, device),
             Conditioning::Film => sine::first_map(directional, hidden, rng, device),
-            Conditioning::Concat => sine::first_map(directional + told, hidden, rng, device),
+            Conditioning::Concat => sine::first_map(directional + features, hidden, rng, device),
         };
         let omega = sine::initial_omega(config);
         let count = 0..config.layers;
         let layers = match conditioning {
             Conditioning::Attention => {
-                Layers::Attention(count.map(|_| Layer::new(told, hidden, rng, device)).collect())
+                Layers::Attention(count.map(|_| Layer::new(features, hidden, rng, device)).collect())
             }
             Conditioning::Tokens => {
                 Layers::Tokens(count.map(|_| TokenLayer::new(hidden, config.heads, rng, device)).collect())
@@ -179,11 +179,11 @@ impl Decoder {
         let products = input::products(self.config.equivariance, latent.clone());
         let (config, condition) = (&self.config, self.condition.as_ref());
         let (weight, bias) = (self.input.weight.val(), self.input.bias.val().unsqueeze::<2>());
-        let told = |latent| invariants::vector(config, condition, latent);
+        let features = |latent| invariants::vector(config, condition, latent);
         let y = match (&self.layers, &self.tokens) {
             (Layers::Attention(layers), _) => {
-                let told = told(latent);
-                let mut attention = layers.iter().map(|layer| layer.attention(told.clone()));
+                let features = features(latent);
+                let mut attention = layers.iter().map(|layer| layer.attention(features.clone()));
                 let (first, rest) = layers.split_first().expect("a decoder has at least one layer");
                 let offset = attention.next().expect("one per layer") + bias;
                 let mut x = first.forward(input::project(weight, products, basis, offset));
@@ -205,13 +205,13 @@ impl Decoder {
             (Layers::Tokens(_), None) => unreachable!("token layers come with tokens"),
             (Layers::Sines(layers), _) if config.conditioning == Conditioning::Film => {
                 let x = input::project(weight, products, basis, bias);
-                self.output.forward(sine::film(&self.mapping, told(latent), layers, x))
+                self.output.forward(sine::film(&self.mapping, features(latent), layers, x))
             }
             (Layers::Sines(layers), _) => {
                 // what does not depend on the ray is an offset
-                let told = told(latent);
-                let (directional, width) = (config.direction_inputs(n), told.dims()[1]);
-                let offset = told.matmul(weight.clone().narrow(0, directional, width)) + bias;
+                let features = features(latent);
+                let (directional, width) = (config.direction_inputs(n), features.dims()[1]);
+                let offset = features.matmul(weight.clone().narrow(0, directional, width)) + bias;
                 let x = input::project(weight.narrow(0, 0, directional), products, basis, offset);
                 self.output.forward(sine::siren(config.omega, layers, x))
             }

@@ -2,9 +2,9 @@
 //! tensor operations.
 //!
 //! Conditioning stays on the graph: the latent's products, one vector per layer and image. What runs for every
-//! direction does not. Its gradients by everything it was given come back as constants G, and ⟨T, G⟩ summed over all
-//! of these tensors T is a scalar on the graph with the gradient of the loss: its backward pass goes on to the latent,
-//! to the encoder and to the parameters.
+//! direction does not. Its gradients with respect to everything it was given come back as constants G, and ⟨T, G⟩
+//! summed over all of these tensors T is a scalar on the graph with the gradient of the loss: its backward pass goes on
+//! to the latent, to the encoder and to the parameters.
 
 use std::collections::BTreeMap;
 
@@ -47,8 +47,8 @@ impl Decoder {
             self.latent_vectors,
             latent.dims()
         );
-        let told = invariants::vector(&self.config, self.condition.as_ref(), latent.clone());
-        let attention = layers.iter().map(|layer| layer.attention(told.clone()));
+        let features = invariants::vector(&self.config, self.condition.as_ref(), latent.clone());
+        let attention = layers.iter().map(|layer| layer.attention(features.clone()));
         let offsets = [self.input.bias.val()].into_iter().chain(layers.iter().map(|l| l.norm2.beta.val()));
         let offsets = offsets.map(|offset| offset.unsqueeze::<2>());
         let last = layers.last().expect("a decoder has at least one layer").norm2.beta.val();
@@ -116,16 +116,16 @@ impl Native {
         self.perceptron.forward(&self.images, &self.split(directions, rays)).into_flattened()
     }
 
-    /// A scalar on the graph with the gradient of Σ slope · log radiance; its value means nothing. Directions as in
-    /// [`Native::forward`], slopes `[B, R, 3]`.
+    /// A scalar on the graph with the gradient of Σ gradient · log radiance; its value means nothing. Directions as in
+    /// [`Native::forward`], gradients `[B, R, 3]`.
     ///
     /// # Panics
     /// If shapes disagree.
-    pub fn backward(self, directions: &[[f32; 3]], rays: usize, slopes: &[f32]) -> Tensor<1> {
-        let (count, images) = (slopes.len(), self.images.len());
-        assert!(count == 3 * images * rays, "{count} slopes for {images} images of {rays} directions");
+    pub fn backward(self, directions: &[[f32; 3]], rays: usize, gradients: &[f32]) -> Tensor<1> {
+        let (count, images) = (gradients.len(), self.images.len());
+        assert!(count == 3 * images * rays, "{count} gradients for {images} images of {rays} directions");
         let directions = self.split(directions, rays);
-        let found = self.perceptron.backward(&self.images, &directions, slopes.as_chunks().0);
+        let found = self.perceptron.backward(&self.images, &directions, gradients.as_chunks().0);
         let vectors = found.images.iter().flat_map(|i| &i.vectors).flat_map(|[x, y]| [*x, *y, 0.0]);
         let mut total = pair(self.latent, vectors.collect());
         let hidden = self.added[0].dims()[1];
@@ -139,7 +139,7 @@ impl Native {
                 + match (matrices.remove(&name), vectors.remove(&name)) {
                     (Some(matrix), _) => pair(matrix, gradient),
                     (_, Some(vector)) => pair(vector, gradient),
-                    _ => unreachable!("{name} is no tensor of a decoder"),
+                    _ => unreachable!("{name} is not a tensor of a decoder"),
                 };
         }
         total

@@ -74,10 +74,10 @@ pub(super) fn siren(omega: f64, layers: &[Linear], x: Tensor<3>) -> Tensor<3> {
     layers.iter().fold((x * omega).sin(), |x, layer| (layer.forward(x) * omega).sin())
 }
 
-/// sin(ω_l ∘ x + φ_l) in place of it, frequencies and phases from what the network is told about the latent [B, C]:
+/// sin(ω_l ∘ x + φ_l) in place of it, frequencies and phases from the latent's condition features [B, C]:
 /// the mapping network's output is [f of every sine | φ of every sine], and ω = 15 f + 30.
-pub(super) fn film(mapping: &[Linear], told: Tensor<2>, layers: &[Linear], x: Tensor<3>) -> Tensor<3> {
-    let mut modulation = told;
+pub(super) fn film(mapping: &[Linear], features: Tensor<2>, layers: &[Linear], x: Tensor<3>) -> Tensor<3> {
+    let mut modulation = features;
     for (k, linear) in mapping.iter().enumerate() {
         let input = if k == 0 { modulation } else { leaky_relu(modulation, SLOPE) };
         modulation = linear.forward(input);

@@ -31,8 +31,8 @@ impl Tokens {
     }
 
     /// [B, N, C/N] → [B, N, h].
-    pub fn forward(&self, told: Tensor<3>) -> Tensor<3> {
-        told.matmul(self.weight.val().unsqueeze()) + self.bias.val().unsqueeze()
+    pub fn forward(&self, features: Tensor<3>) -> Tensor<3> {
+        features.matmul(self.weight.val().unsqueeze()) + self.bias.val().unsqueeze()
     }
 }
 

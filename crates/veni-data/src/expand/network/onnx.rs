@@ -32,9 +32,9 @@ impl OnnxNetwork {
     /// Loads a network and tries it once, so that one that does not fit is refused before any work.
     ///
     /// # Errors
-    /// [`Error::Io`] if the file cannot be read; [`Error::Invalid`] if it is no ONNX model or damaged, or if its input or
-    /// output is not as asked; [`Error::Unsupported`] for operators that the runtime does not have and for weights in
-    /// other files.
+    /// [`Error::Io`] if the file cannot be read; [`Error::Invalid`] if it is not an ONNX model or damaged, or if its
+    /// input or output is not as asked; [`Error::Unsupported`] for operators that the runtime does not have and for
+    /// weights in other files.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let meta = std::fs::metadata(path).map_err(|e| Error::io(path, "open", e))?;
@@ -57,7 +57,7 @@ impl OnnxNetwork {
     fn parse(name: String, bytes: Vec<u8>) -> Result<Self> {
         let digest = Digest::of(&bytes);
         if !is_whole(&bytes) {
-            return Err(Error::invalid("is no ONNX model, or truncated"));
+            return Err(Error::invalid("is not an ONNX model, or truncated"));
         }
         let model = Model::load(bytes).map_err(|e| refusal(&e))?;
         let input = only(&model, model.input_ids(), "input")?;
@@ -95,7 +95,7 @@ impl OnnxNetwork {
             )));
         }
         let (found, planes) = result.into_shape_vec::<f32, 4>().map_err(|e| {
-            Error::invalid(format!("its output is no image: for an input of {wanted}, {}", line(&e)))
+            Error::invalid(format!("its output is not an image: for an input of {wanted}, {}", line(&e)))
         })?;
         if found != shape {
             return Err(Error::invalid(format!(
@@ -221,7 +221,7 @@ fn refusal(error: &LoadError) -> Error {
             Error::unsupported(format!("has an operator that the ONNX runtime (rten) cannot run: {text}"))
         }
         LoadErrorKind::UnknownFileType | LoadErrorKind::ParseError | LoadErrorKind::FormatNotEnabled => {
-            Error::invalid(format!("is no ONNX model, or damaged: {text}"))
+            Error::invalid(format!("is not an ONNX model, or damaged: {text}"))
         }
         _ => Error::invalid(format!("the ONNX runtime (rten) cannot load it: {text}")),
     }

@@ -111,9 +111,9 @@ fn networks_in_onnx_files_are_run() {
 fn files_that_do_not_fit_are_refused() {
     let folder = Folder::new();
     let whole = OnnxFile::times(4.0, [0, 0]).bytes();
-    folder.refused("text.onnx", b"this is no ONNX file", &["no ONNX model"]);
-    folder.refused("empty.onnx", b"", &["no ONNX model"]);
-    folder.refused("picture.onnx", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", &["no ONNX model"]);
+    folder.refused("text.onnx", b"this is not an ONNX file", &["not an ONNX model"]);
+    folder.refused("empty.onnx", b"", &["not an ONNX model"]);
+    folder.refused("picture.onnx", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", &["not an ONNX model"]);
     for length in 0..whole.len() {
         let cut = OnnxNetwork::load(folder.write("cut.onnx", &whole[..length]));
         // the operator set comes last, in 4 bytes, and the runtime does without
@@ -138,7 +138,7 @@ fn files_that_do_not_fit_are_refused() {
         &with(&[1, 3, 0, 0], &[], "GlobalAveragePool"),
         &["1 x 3 x 1 x 1", "1 x 3 x 64 x 128"],
     );
-    folder.refused("flat.onnx", &with(&[1, 3, 0, 0], &[], "Flatten"), &["no image", "4 dims but has 2"]);
+    folder.refused("flat.onnx", &with(&[1, 3, 0, 0], &[], "Flatten"), &["not an image", "4 dims but has 2"]);
     folder.refused("shape.onnx", &with(&[1, 3, 0, 0], &[], "Shape"), &["output", "float"]);
     let pixels = OnnxFile::default().value(11, "x", INT32, &[1, 3, 0, 0]).value(12, "y", FLOAT, &[]);
     folder.refused("int.onnx", &pixels.node("Relu", &["x"], "y", &[]).bytes(), &["input 'x' is", "float"]);

@@ -7,7 +7,7 @@ use veni_image::Panorama;
 use veni_light::sphere::Equirect;
 use crate::{Error, Result};
 
-/// By so many pixels a panorama goes on beyond each of its edges.
+/// By this many pixels a panorama is continued beyond each of its edges.
 const MARGIN: usize = 64;
 /// Sides become a multiple of this: encoders and decoders of five levels halve them five times.
 const MULTIPLE: usize = 32;

@@ -12,7 +12,7 @@ const BLUNT: f64 = 0.05;
 /// How the lobes are searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Search {
-    /// The best of so many starts is taken. Each places lobe after lobe, always the one out of a dictionary that explains
+    /// The best of this many starts is taken. Each places lobe after lobe, always the one out of a dictionary that explains
     /// most of what is left; all but the first multiply these gains by random factors between ½ and 1.
     pub starts: u64,
     /// Adam steps of each start.

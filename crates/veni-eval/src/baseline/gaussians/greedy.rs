@@ -4,7 +4,7 @@
 use super::{dot, shape};
 use crate::baseline::least_squares;
 use crate::baseline::target::Target;
-use veni_light::sphere::reference::sunflower_sphere;
+use veni_light::sphere::reference::fibonacci_sphere;
 
 /// Pixels looked at, about.
 const PIXELS: usize = 2048;
@@ -59,7 +59,7 @@ pub(super) fn shapes(
 fn dictionary(sharpest: f64) -> Vec<[f64; 4]> {
     let steps = std::iter::successors(Some(1.0), |l| Some(l * RATIO));
     let ladder: Vec<f64> = steps.take_while(|l| *l <= sharpest.max(1.0)).collect();
-    let axes = sunflower_sphere(AXES).into_iter().map(|a| a.map(f64::from));
+    let axes = fibonacci_sphere(AXES).into_iter().map(|a| a.map(f64::from));
     axes.flat_map(|[x, y, z]| ladder.iter().map(move |l| [x, y, z, l.ln()])).collect()
 }
 

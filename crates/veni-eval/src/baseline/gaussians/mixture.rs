@@ -52,21 +52,21 @@ impl Problem for Mixture<'_> {
         let matrix = shape::matrix(shapes, directions);
         let amplitudes: Vec<[f64; 3]> = logs.as_chunks::<3>().0.iter().map(|w| w.map(f64::exp)).collect();
         let (mut loss, mut pull) = (0.0, Vec::with_capacity(self.lobes * directions.len()));
-        let mut slopes = vec![[0.0; 3]; self.lobes + 1];
+        let mut by_amplitude = vec![[0.0; 3]; self.lobes + 1];
         for ((row, w), t) in matrix.chunks_exact(self.lobes + 1).zip(weights).zip(values) {
             let mut sum = [0.0; 3];
             for (e, a) in row.iter().zip(&amplitudes) {
                 sum.iter_mut().zip(a).for_each(|(s, a)| *s += e * a);
             }
-            let mut slope = [0.0; 3];
+            let mut by_sum = [0.0; 3];
             for c in 0..3 {
                 let residual = sum[c].ln() - t[c];
                 loss += w * residual * residual / 3.0;
-                slope[c] = 2.0 / 3.0 * w * residual / sum[c];
+                by_sum[c] = 2.0 / 3.0 * w * residual / sum[c];
             }
             // what each lobe's logarithm pulls, per channel: its own amplitude and, added up, its shape
-            let each = row.iter().zip(&amplitudes).map(|(e, a)| [0, 1, 2].map(|c| slope[c] * e * a[c]));
-            for (k, (total, each)) in slopes.iter_mut().zip(each).enumerate() {
+            let each = row.iter().zip(&amplitudes).map(|(e, a)| [0, 1, 2].map(|c| by_sum[c] * e * a[c]));
+            for (k, (total, each)) in by_amplitude.iter_mut().zip(each).enumerate() {
                 total.iter_mut().zip(each).for_each(|(t, v)| *t += v);
                 if k < self.lobes {
                     pull.push(each.iter().sum());
@@ -74,7 +74,7 @@ impl Problem for Mixture<'_> {
             }
         }
         let mut gradient = shape::gradient(shapes, directions, &pull);
-        gradient.extend(slopes.into_iter().flatten());
+        gradient.extend(by_amplitude.into_iter().flatten());
         (loss, gradient)
     }
 

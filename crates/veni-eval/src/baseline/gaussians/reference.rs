@@ -23,8 +23,8 @@ struct Lobe {
     polar: f64,
     azimuth: f64,
     sharpness: f64,
-    polar_slope: f64,
-    azimuth_slope: f64,
+    polar_derivative: f64,
+    azimuth_derivative: f64,
 }
 
 impl Grid {
@@ -43,7 +43,7 @@ impl Grid {
         self.len() == 0
     }
 
-    /// The authors' start: all 0 but ln λ = ln(π/rows).
+    /// The reference implementation's start: all 0 but ln λ = ln(π/rows).
     pub fn start(self) -> Vec<f64> {
         [0.0, 0.0, 0.0, 0.0, 0.0, (PI / self.rows as f64).ln()].repeat(self.len())
     }
@@ -57,8 +57,8 @@ impl Grid {
             polar: (j as f64 + 0.5) * height + 1.5 * height * polar,
             azimuth: (i as f64 + 0.5) * width - PI + 1.5 * width * azimuth,
             sharpness: p[5].exp(),
-            polar_slope: 1.5 * height * (1.0 - polar * polar),
-            azimuth_slope: 1.5 * width * (1.0 - azimuth * azimuth),
+            polar_derivative: 1.5 * height * (1.0 - polar * polar),
+            azimuth_derivative: 1.5 * width * (1.0 - azimuth * azimuth),
         }
     }
 
@@ -87,7 +87,7 @@ impl Grid {
                     out[c] += share;
                     pull += share;
                 }
-                out.iter_mut().skip(3).zip(term.slopes).for_each(|(o, s)| *o += pull * s);
+                out.iter_mut().skip(3).zip(term.derivatives).for_each(|(o, s)| *o += pull * s);
             }
         });
         out
@@ -116,7 +116,7 @@ impl Grid {
 /// What a lobe adds at one direction, and ∂/∂(p₃, p₄, p₅) of its logarithm.
 struct Term {
     value: [f64; 3],
-    slopes: [f64; 3],
+    derivatives: [f64; 3],
 }
 
 impl Term {
@@ -126,9 +126,9 @@ impl Term {
         let height = lobe.sharpness * (st * sl * cos + ct * cl - 1.0);
         Self {
             value: [0, 1, 2].map(|c| (p[c] + height).exp()),
-            slopes: [
-                lobe.sharpness * (st * cl * cos - ct * sl) * lobe.polar_slope,
-                lobe.sharpness * st * sl * sin * lobe.azimuth_slope,
+            derivatives: [
+                lobe.sharpness * (st * cl * cos - ct * sl) * lobe.polar_derivative,
+                lobe.sharpness * st * sl * sin * lobe.azimuth_derivative,
                 height,
             ],
         }

@@ -53,8 +53,8 @@ impl Problem for Separable<'_> {
                 residual.iter_mut().zip(a).for_each(|(r, a)| *r += e * a);
             }
             loss += w * residual.iter().map(|r| r * r).sum::<f64>() / 3.0;
-            let slope = residual.map(|r| 2.0 / 3.0 * w * r);
-            pull.extend(row.iter().zip(&best[..self.lobes]).map(|(e, a)| e * super::dot(slope, *a)));
+            let by_sum = residual.map(|r| 2.0 / 3.0 * w * r);
+            pull.extend(row.iter().zip(&best[..self.lobes]).map(|(e, a)| e * super::dot(by_sum, *a)));
         }
         loss += RIDGE / 3.0 * best.iter().flatten().map(|a| a * a).sum::<f64>();
         (loss, shape::gradient(x, directions, &pull))

@@ -1,7 +1,7 @@
 //! Whole encoders, through the crate's own entry points.
 //!
-//! The authors' `mirror`: "early" negates the x of the directions, "late" negates the x of what comes out, once in
-//! training and (by a bug of theirs) twice, that is not at all, in evaluation.
+//! The reference implementation's `mirror`: "early" negates the x of the directions, "late" negates the x of what comes
+//! out, once in training and (by a bug of theirs) twice, that is not at all, in evaluation.
 
 use std::collections::BTreeMap;
 

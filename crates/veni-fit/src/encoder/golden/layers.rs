@@ -199,7 +199,7 @@ fn attention(case: &Case, layer: VectorLayer) -> Result<(), Skipped> {
         let each = x.tokens() * attention.seen_width();
         let mut seen = vec![0.0; heads * each];
         for (h, seen) in seen.chunks_exact_mut(each).enumerate() {
-            attention.look(h, &query, &key_value, seen, &mut attention::Room::default());
+            attention.look(h, &query, &key_value, seen, &mut attention::Workspace::default());
         }
         let mut y = vec![0.0; x.data.len()];
         attention.gather(&seen, 0, &mut y, &mut Default::default());
@@ -218,7 +218,7 @@ fn feed_forward(case: &Case, layer: VectorLayer) -> Result<(), Skipped> {
     let block = FeedForward::new(Tensors(&tensors), "m", maps, form(case, layer));
     compare(case, &axes(case, "invariant_axes"), channels, |x| {
         let mut y = vec![0.0; x.data.len()];
-        block.apply(x, &mut y, &mut feed_forward::Room::default());
+        block.apply(x, &mut y, &mut feed_forward::Workspace::default());
         y
     });
     Ok(())

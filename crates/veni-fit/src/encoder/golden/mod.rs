@@ -1,4 +1,4 @@
-//! Golden numbers of the authors' program: single layers and whole encoders, under each file's own tolerance.
+//! Golden numbers of the reference implementation: single layers and whole encoders, under each file's own tolerance.
 //!
 //! The files, their reader and the tolerance rule are those of the whole system's golden test. Gradients in the files
 //! are not computed here, and neither are layers that this encoder lacks; those cases are skipped by name.

@@ -1,7 +1,7 @@
 //! Levenberg–Marquardt: what it finds, when it ends, where it does not apply.
 
 use super::super::config::Method;
-use super::super::levenberg_marquardt::{Search, Slopes};
+use super::super::levenberg_marquardt::{QuadraticModel, Search};
 use super::*;
 use veni_light::field::NormalEquations;
 
@@ -66,24 +66,24 @@ fn it_ends_where_no_direction_goes_down_with_prior_and_every_objective() {
 fn a_wrong_gradient_or_matrix_takes_it_nowhere() {
     // ½ xᵀHx around a start, H far from diagonal
     let h = [[2.0, 1.9, 0.0], [1.9, 2.0, 0.3], [0.0, 0.3, 1.0]];
-    let slopes = |z: &Latent, sign: f64| -> Slopes {
+    let quadratic = |z: &Latent, sign: f64| -> QuadraticModel {
         let x = z.vectors[0].map(f64::from);
         let g: Vec<f64> = h.iter().map(|row| (0..3).map(|k| row[k] * x[k]).sum()).collect();
         let loss = 0.5 * (0..3).map(|k| g[k] * x[k]).sum::<f64>();
         let mut matrix = vec![0.0; 16];
         (0..9).for_each(|k| matrix[k / 3 * 4 + k % 3] = h[k / 3][k % 3]);
         let gradient = g.into_iter().map(|g| sign * g).chain([0.0]).collect();
-        Slopes::new(NormalEquations { loss, gradient, matrix }, false)
+        QuadraticModel::new(NormalEquations { loss, gradient, matrix }, false)
     };
     let start = Latent::new(vec![[1.0, -2.0, 3.0]]);
     let after = |sign: f64, steps: usize| {
-        let mut search = Search::new(start.clone(), slopes(&start, sign));
+        let mut search = Search::new(start.clone(), quadratic(&start, sign));
         for _ in 0..steps {
-            search.step(|z| Ok(slopes(z, sign))).unwrap();
+            search.step(|z| Ok(quadratic(z, sign))).unwrap();
         }
         search
     };
-    let before = slopes(&start, 1.0);
+    let before = quadratic(&start, 1.0);
     let begin = Search::new(start.clone(), before).value();
     assert!(after(1.0, 6).value() < 1e-6 * begin, "{}", after(1.0, 6).value());
     let wrong = after(-1.0, 20);

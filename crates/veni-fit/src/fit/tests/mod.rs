@@ -127,7 +127,7 @@ fn light_deals_out_its_share_of_the_weight() {
 }
 
 #[test]
-fn slopes_are_those_of_the_pixel_losses() {
+fn gradients_are_those_of_the_pixel_losses() {
     let grid = Equirect::new(4, 2);
     let image: Vec<f32> = (0..24).map(|k| (k as f32 * 0.7).sin()).collect();
     let clipped: Vec<bool> = (0..24).map(|k| k % 3 == 0).collect();
@@ -137,7 +137,7 @@ fn slopes_are_those_of_the_pixel_losses() {
         let loss = PixelLoss::new(*objective, target.images()[0], &target.areas());
         for pixel in 0..8 {
             let p = [0, 1, 2].map(|c| (1.3 * (3 * pixel + c) as f64).cos());
-            let PixelValue { slope: slopes, curvature, .. } = loss.at(pixel, p);
+            let PixelValue { gradient, curvature, .. } = loss.at(pixel, p);
             for c in 0..3 {
                 let moved = |step: f64| {
                     let mut q = p;
@@ -145,13 +145,13 @@ fn slopes_are_those_of_the_pixel_losses() {
                     loss.at(pixel, q).loss
                 };
                 let expected = (moved(1e-6) - moved(-1e-6)) / 2e-6;
-                assert!((slopes[c] - expected).abs() < 1e-7, "{objective:?}, {pixel}, {c}");
+                assert!((gradient[c] - expected).abs() < 1e-7, "{objective:?}, {pixel}, {c}");
                 // a clipped value is left alone on one side only
                 if clipped[3 * pixel + c] {
                     continue;
                 }
                 // the parabola lies above an absolute error, and is a squared error itself
-                let parabola = |d: f64| loss.at(pixel, p).loss + slopes[c] * d + 0.5 * curvature[c] * d * d;
+                let parabola = |d: f64| loss.at(pixel, p).loss + gradient[c] * d + 0.5 * curvature[c] * d * d;
                 for over in [-1.0, -0.1, 0.1, 1.0].map(|d| parabola(d) - moved(d)) {
                     match objective {
                         Objective::LogAbsolute => assert!(over > -1e-9, "{pixel}, {c}: {over}"),

@@ -1,7 +1,7 @@
 //! Matrix products of training in bfloat16: mixed precision where the processor has it.
 //!
 //! bfloat16 is f32 without its last 16 bits: the same range, eight significant bits. Both factors of every product are
-//! rounded to it, to nearest and ties to even; sums, and everything that is no matrix product (encoding, norms, ReLU,
+//! rounded to it, to nearest and ties to even; sums, and everything that is not a matrix product (encoding, norms, ReLU,
 //! losses, the weights that are trained), stay in f32. x86 processors with AVX512-BF16 (Zen 4, Cooper Lake, Sapphire
 //! Rapids and later) multiply and add pairs at twice the rate of f32.
 //!
@@ -22,7 +22,7 @@ const LANES: usize = 16;
 type Row = [[f32; LANES]; super::block::VECTORS];
 /// Outputs of a panel of the sums x gᵀ.
 type Wide = [[f32; LANES]; 2];
-/// Pairs of directions of such a panel, turned round.
+/// Pairs of directions of such a panel, transposed.
 type WidePairs = [[u32; LANES]; 2];
 
 /// Proof that this processor multiplies in bfloat16.
@@ -37,8 +37,8 @@ impl Bfloat16 {
 
     /// Turns the rows of a block's gradient round for [`Bfloat16::add`]: panel by panel, in each pair of directions by
     /// pair. What `out` holds beyond the last row stays.
-    pub(super) fn turn_round(self, rows: &[Row], out: &mut [WidePairs]) {
-        kernels::turn_round(self, rows, out);
+    pub(super) fn transpose(self, rows: &[Row], out: &mut [WidePairs]) {
+        kernels::transpose(self, rows, out);
     }
 
     /// Adds x gᵀ of a block to `sums`, which lie panel by panel, in each input by input.

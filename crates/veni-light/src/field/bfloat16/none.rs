@@ -15,7 +15,7 @@ pub(super) fn product<const ADD: bool, const RELU: bool>(
     never(matrix.token)
 }
 
-pub(super) fn turn_round(token: Bfloat16, _rows: &[Row], _out: &mut [WidePairs]) {
+pub(super) fn transpose(token: Bfloat16, _rows: &[Row], _out: &mut [WidePairs]) {
     never(token)
 }
 

@@ -118,10 +118,10 @@ fn outer_products_are_sums_of_rounded_factors() {
     for (inputs, outputs) in [(3, 32), (21, 40), (128, 128), (301, 32)] {
         let (x, g) = (rows(inputs, &mut rng), rows(outputs, &mut rng));
         let panels = outputs.div_ceil(2 * LANES);
-        let mut turned: Vec<WidePairs> = vec![[[0; LANES]; 2]; panels * BLOCK / 2];
-        token.turn_round(&g, &mut turned);
+        let mut transposed: Vec<WidePairs> = vec![[[0; LANES]; 2]; panels * BLOCK / 2];
+        token.transpose(&g, &mut transposed);
         let mut found: Vec<Wide> = vec![[[0.75; LANES]; 2]; panels * inputs];
-        token.add(&x, &turned, &mut found);
+        token.add(&x, &transposed, &mut found);
         let mut apart = Apart::default();
         for (o, g) in g.iter().enumerate() {
             for (i, x) in x.iter().enumerate() {

@@ -48,9 +48,9 @@ pub(super) fn product<const ADD: bool, const RELU: bool>(
     unsafe { panels::<ADD, RELU>(matrix, bias, x, y) }
 }
 
-pub(super) fn turn_round(_token: Bfloat16, rows: &[Row], out: &mut [WidePairs]) {
+pub(super) fn transpose(_token: Bfloat16, rows: &[Row], out: &mut [WidePairs]) {
     // SAFETY: as in `product`.
-    unsafe { transpose(rows, out) }
+    unsafe { transpose_pairs(rows, out) }
 }
 
 pub(super) fn add(_token: Bfloat16, x: &[Row], gradient: &[WidePairs], sums: &mut [Wide]) {
@@ -140,7 +140,7 @@ fn round(row: &Row) -> [u32; DIRECTIONS] {
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512bf16")]
-fn transpose(rows: &[Row], out: &mut [WidePairs]) {
+fn transpose_pairs(rows: &[Row], out: &mut [WidePairs]) {
     for (rows, panel) in rows.chunks(2 * LANES).zip(out.chunks_exact_mut(DIRECTIONS)) {
         for (o, row) in rows.iter().enumerate() {
             for (pair, out) in round(row).into_iter().zip(panel.iter_mut()) {

@@ -5,7 +5,7 @@ use super::backward::Sums;
 use crate::field::Folded;
 use crate::field::weights::{Affine, Weights};
 
-/// The gradient by the latent, from the gradients by what conditioning left of it.
+/// The gradient with respect to the latent, from the gradients with respect to what conditioning left of it.
 pub(super) fn to_latent(weights: &Weights, folded: &Folded, sums: &Sums) -> Gradient {
     let n = weights.latent_vectors;
     let mut condition = vec![0.0f64; 3 * n];
@@ -20,7 +20,7 @@ pub(super) fn to_latent(weights: &Weights, folded: &Folded, sums: &Sums) -> Grad
     let vectors = (folded.vectors.iter().zip(&sums.vectors).zip(condition.as_chunks::<3>().0)).map(
         |(([x, y], [dx, dy]), [a, b, z])| {
             let (x, y) = (f64::from(*x), f64::from(*y));
-            let [p, q] = weights.invariant.slope(x.hypot(y));
+            let [p, q] = weights.invariant.derivative(x.hypot(y));
             let radial = a * p + b * q;
             [(dx + radial * x) as f32, (dy + radial * y) as f32, *z as f32]
         },

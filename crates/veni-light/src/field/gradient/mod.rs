@@ -28,8 +28,8 @@ use super::aligned::Aligned;
 use super::{Field, tasks};
 use backward::{Backward, Sums};
 
-pub(super) use normal::Joint;
-pub use normal::{Curved, NormalEquations};
+pub(super) use normal::ValueOutput;
+pub use normal::{LocalQuadratic, NormalEquations};
 pub(super) use transposed::Transposed;
 
 /// Fewest directions of one task: a few blocks, so that all cores finish together.
@@ -37,7 +37,7 @@ const TASK: usize = 192;
 /// Most tasks: each leaves sums of its own.
 const TASKS: usize = 256;
 
-/// A loss and its gradient by the latent it was taken at.
+/// A loss and its gradient with respect to the latent it was taken at.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gradient {
     /// The sum of what the loss gave for every direction.
@@ -50,7 +50,7 @@ pub struct Gradient {
 
 impl Field {
     /// The gradient of Σᵢ ℓᵢ by the latent. `loss(i, p)` gets the log radiance p (r, g, b, exposure included) in
-    /// direction i and gives ℓᵢ and its derivatives by p; a loss that looks at the whole image is given as
+    /// direction i and gives ℓᵢ and its derivatives with respect to p; a loss that looks at the whole image is given as
     /// those derivatives, computed beforehand from [`Field::log_radiance_batch`].
     ///
     /// Costs the multiply-adds of two [`Field::log_radiance_batch`], on all cores; memory does not grow with

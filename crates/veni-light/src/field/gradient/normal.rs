@@ -10,7 +10,7 @@ use pulp::{Simd, WithSimd};
 use super::in_tasks;
 use super::operations::accumulate_product;
 use super::outer::{self, Wide};
-use super::pass::{Pass, Stations, flat, flat_mut, lane_sum};
+use super::pass::{BackwardVisitor, Pass, flat, flat_mut, lane_sum};
 use crate::field::aligned::Aligned;
 use crate::field::block::{Row, VECTORS, product};
 use crate::field::mlp::{Matrix, Mlp, PANEL};
@@ -21,15 +21,15 @@ use crate::field::{Field, Folded};
 const TASK: usize = 96;
 const TASKS: usize = 16;
 
-/// A direction's loss around a log radiance, channel by channel.
+/// The local quadratic of a direction's loss around a log radiance, channel by channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Curved {
+pub struct LocalQuadratic {
     /// ℓ.
     pub loss: f64,
     /// ∂ℓ/∂p.
-    pub slope: [f32; 3],
-    /// What stands for ∂²ℓ/∂p², at least 0: of a squared error w (p − t)² it is 2w.
-    pub curvature: [f32; 3],
+    pub gradient: [f32; 3],
+    /// The Gauss–Newton weight: what stands for ∂²ℓ/∂p², at least 0; of a squared error w (p − t)² it is 2w.
+    pub weight: [f32; 3],
 }
 
 /// Σᵢ ℓᵢ and its model ℓ + gᵀδ + ½ δᵀHδ for a small change δ of the latent: x, y, z of the N vectors one after the
@@ -54,7 +54,7 @@ impl Field {
     pub fn normal_equations(
         &self,
         directions: &[[f32; 3]],
-        loss: impl Fn(usize, [f32; 3]) -> Curved + Sync,
+        loss: impl Fn(usize, [f32; 3]) -> LocalQuadratic + Sync,
     ) -> NormalEquations {
         let (weights, folded) = (&*self.weights, &*self.folded);
         let chain = Chain::new(weights, folded);
@@ -92,11 +92,11 @@ impl NormalEquations {
     }
 }
 
-/// The attention's linear maps out ∘ value of one layer, [3N, h]: a row for a₁, a₂ and z of every vector.
+/// The fused value–output projection of one layer's attention, [3N, h]: a row for a₁, a₂ and z of every vector.
 #[derive(Debug)]
-pub(in crate::field) struct Joint(Vec<f32>);
+pub(in crate::field) struct ValueOutput(Vec<f32>);
 
-impl Joint {
+impl ValueOutput {
     pub(in crate::field) fn new(value: &Affine, out: &Affine) -> Self {
         let (inner, h) = (value.bias.len(), out.bias.len());
         let rows = value.weight.chunks_exact(inner).flat_map(|row| {
@@ -110,9 +110,9 @@ impl Joint {
     }
 }
 
-/// From the gradient by what a layer's attention adds to that by the vectors' radii and heights.
+/// From the gradient with respect to what a layer's attention adds to that with respect to the vectors' radii and heights.
 ///
-/// The invariants a₁, a₂ of a vector depend on r² = x² + y² alone: their gradients by x and y are those by a
+/// The invariants a₁, a₂ of a vector depend on r² = x² + y² alone: their gradients with respect to x and y are those by a
 /// number ρ, times x and y.
 struct Chain<'a> {
     /// x, y of the vectors.
@@ -124,14 +124,14 @@ struct Chain<'a> {
 impl<'a> Chain<'a> {
     fn new(weights: &Weights, folded: &'a Folded) -> Self {
         let (h, vectors) = (weights.mlp.hidden, folded.vectors.as_slice());
-        let slopes: Vec<[f32; 2]> = vectors
+        let derivatives: Vec<[f32; 2]> = vectors
             .iter()
-            .map(|[x, y]| weights.invariant.slope(f64::from(*x).hypot(f64::from(*y))).map(|s| s as f32))
+            .map(|[x, y]| weights.invariant.derivative(f64::from(*x).hypot(f64::from(*y))).map(|s| s as f32))
             .collect();
         let n = vectors.len();
-        let layer = |Joint(joint): &Joint| {
+        let layer = |ValueOutput(value_output): &ValueOutput| {
             let mut matrix = vec![0.0; 2 * n * h];
-            for (j, (rows, [p, q])) in joint.chunks_exact(3 * h).zip(&slopes).enumerate() {
+            for (j, (rows, [p, q])) in value_output.chunks_exact(3 * h).zip(&derivatives).enumerate() {
                 let (a, b, z) = (&rows[..h], &rows[h..2 * h], &rows[2 * h..]);
                 for i in 0..h {
                     matrix[2 * n * i + j] = p * a[i] + q * b[i];
@@ -140,7 +140,7 @@ impl<'a> Chain<'a> {
             }
             Matrix::new(&matrix, 2 * n)
         };
-        Self { vectors, layers: weights.joint().iter().map(layer).collect() }
+        Self { vectors, layers: weights.value_output().iter().map(layer).collect() }
     }
 
     /// 2N rounded up to whole panels.
@@ -150,7 +150,7 @@ impl<'a> Chain<'a> {
 }
 
 /// A loss by direction and log radiance.
-type CurvedLoss<'a> = dyn Fn(usize, [f32; 3]) -> Curved + Sync + 'a;
+type QuadraticLoss<'a> = dyn Fn(usize, [f32; 3]) -> LocalQuadratic + Sync + 'a;
 
 /// Work for one thread: any number of directions.
 struct Normal<'a> {
@@ -158,7 +158,7 @@ struct Normal<'a> {
     folded: &'a Folded,
     chain: &'a Chain<'a>,
     directions: &'a [[f32; 3]],
-    loss: &'a CurvedLoss<'a>,
+    loss: &'a QuadraticLoss<'a>,
     sums: &'a mut NormalEquations,
     scratch: &'a mut Aligned,
 }
@@ -175,18 +175,18 @@ impl WithSimd for Normal<'_> {
         let rows = Pass::<S>::rows(mlp) + 2 * 3 + 2 * unknowns + chain.padded();
         let vectors = wide * panels * (lanes + unknowns) + unknowns;
         let scratch = scratch.at_least(lanes * rows + S::F32_LANES * vectors);
-        let (all, room) = S::as_mut_simd_f32s(scratch).0.split_at_mut(VECTORS * rows);
+        let (all, workspace) = S::as_mut_simd_f32s(scratch).0.split_at_mut(VECTORS * rows);
         let (mut pass, rest) = Pass::new(simd, mlp, folded, all.as_chunks_mut::<VECTORS>().0);
-        let (slopes, rest) = rest.split_at_mut(3);
-        let (curvatures, rest) = rest.split_at_mut(3);
+        let (gradients, rest) = rest.split_at_mut(3);
+        let (weights, rest) = rest.split_at_mut(3);
         let (jacobian, rest) = rest.split_at_mut(unknowns);
         let (weighted, polar) = rest.split_at_mut(unknowns);
         let zero = simd.splat_f32s(0.0);
-        room[..vectors].fill(zero);
-        let (turned, room) = room.split_at_mut(wide * panels * lanes);
-        let (matrix, room) = room.split_at_mut(wide * panels * unknowns);
-        let (turned, matrix) = (turned.as_chunks_mut().0, matrix.as_chunks_mut().0);
-        let gradient = &mut room[..unknowns];
+        workspace[..vectors].fill(zero);
+        let (transposed, workspace) = workspace.split_at_mut(wide * panels * lanes);
+        let (matrix, workspace) = workspace.split_at_mut(wide * panels * unknowns);
+        let (transposed, matrix) = (transposed.as_chunks_mut().0, matrix.as_chunks_mut().0);
+        let gradient = &mut workspace[..unknowns];
         // the last coordinate, the log exposure, adds to every log radiance alike
         jacobian[unknowns - 1] = [simd.splat_f32s(1.0); VECTORS];
         let zeros = vec![0.0; chain.padded()];
@@ -196,17 +196,17 @@ impl WithSimd for Normal<'_> {
             pass.forward(simd, directions);
             {
                 let rgb = flat::<S>(pass.rgb);
-                let (slopes, curvatures) = (flat_mut::<S>(slopes), flat_mut::<S>(curvatures));
+                let (gradients, weights) = (flat_mut::<S>(gradients), flat_mut::<S>(weights));
                 // idle lanes of a short block count nothing
-                slopes.fill(0.0);
-                curvatures.fill(0.0);
+                gradients.fill(0.0);
+                weights.fill(0.0);
                 for i in 0..directions.len() {
                     let p = [0, 1, 2].map(|c| rgb[c * lanes + i] + folded.log_exposure);
-                    let curved = loss(b * lanes + i, p);
-                    sums.loss += curved.loss;
+                    let local = loss(b * lanes + i, p);
+                    sums.loss += local.loss;
                     for c in 0..3 {
-                        slopes[c * lanes + i] = curved.slope[c];
-                        curvatures[c * lanes + i] = curved.curvature[c];
+                        gradients[c * lanes + i] = local.gradient[c];
+                        weights[c * lanes + i] = local.weight[c];
                     }
                 }
             }
@@ -220,12 +220,12 @@ impl WithSimd for Normal<'_> {
                     weighted.iter_mut().zip(rows.jacobian.iter()).zip(&mut *gradient)
                 {
                     for v in 0..VECTORS {
-                        weighted[v] = simd.mul_f32s(row[v], curvatures[c][v]);
+                        weighted[v] = simd.mul_f32s(row[v], weights[c][v]);
                     }
-                    *sum = accumulate_product(simd, *sum, row, &slopes[c]);
+                    *sum = accumulate_product(simd, *sum, row, &gradients[c]);
                 }
-                outer::turn_round::<S>(weighted, turned);
-                outer::add(simd, rows.jacobian, turned, matrix);
+                outer::transpose::<S>(weighted, transposed);
+                outer::add(simd, rows.jacobian, transposed, matrix);
             }
         }
         for (sum, vector) in sums.gradient.iter_mut().zip(gradient) {
@@ -267,7 +267,7 @@ impl<S: Simd> Rows<'_, S> {
     }
 }
 
-impl<S: Simd> Stations<S> for Rows<'_, S> {
+impl<S: Simd> BackwardVisitor<S> for Rows<'_, S> {
     #[inline(always)]
     fn added(&mut self, simd: S, at: usize, gradient: &[Row<S>]) {
         // nothing of the latent is added after the last layer

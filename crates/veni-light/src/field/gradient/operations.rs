@@ -49,23 +49,23 @@ pub(super) fn unstandardise<S: Simd>(
     scale: Row<S>,
 ) {
     let zero = simd.splat_f32s(0.0);
-    let (mut mean, mut slope) = ([zero; VECTORS], [zero; VECTORS]);
+    let (mut mean, mut projection) = ([zero; VECTORS], [zero; VECTORS]);
     for ((g, gamma), x) in gradient.iter_mut().zip(gamma).zip(standard) {
         let gamma = simd.splat_f32s(*gamma);
         for v in 0..VECTORS {
             g[v] = simd.mul_f32s(g[v], gamma);
             mean[v] = simd.add_f32s(mean[v], g[v]);
-            slope[v] = simd.mul_add_e_f32s(g[v], x[v], slope[v]);
+            projection[v] = simd.mul_add_e_f32s(g[v], x[v], projection[v]);
         }
     }
     let count = simd.splat_f32s(1.0 / standard.len() as f32);
     for v in 0..VECTORS {
         mean[v] = simd.mul_f32s(mean[v], count);
-        slope[v] = simd.mul_f32s(slope[v], count);
+        projection[v] = simd.mul_f32s(projection[v], count);
     }
     for (g, x) in gradient.iter_mut().zip(standard) {
         for v in 0..VECTORS {
-            let inside = simd.sub_f32s(simd.sub_f32s(g[v], mean[v]), simd.mul_f32s(x[v], slope[v]));
+            let inside = simd.sub_f32s(simd.sub_f32s(g[v], mean[v]), simd.mul_f32s(x[v], projection[v]));
             g[v] = simd.mul_f32s(inside, scale[v]);
         }
     }
@@ -103,8 +103,8 @@ pub(super) fn accumulate_product<S: Simd>(simd: S, sum: S::f32s, a: &Row<S>, b: 
     (0..VECTORS).fold(sum, |sum, v| simd.mul_add_e_f32s(a[v], b[v], sum))
 }
 
-/// Backward of the encoding: the gradient by every directional input ⟨z, d⟩, given to `each` as the input's index, the
-/// number of the vector in the row, and the vector.
+/// Backward of the encoding: the gradient with respect to every directional input ⟨z, d⟩, given to `each` as the
+/// input's index, the number of the vector in the row, and the vector.
 #[inline(always)]
 pub(super) fn unencode<S: Simd>(
     simd: S,

@@ -1,7 +1,7 @@
-//! Sums over directions of outer products x gᵀ: the gradient by a matrix [in, out].
+//! Sums over directions of outer products x gᵀ: the gradient with respect to a matrix [in, out].
 //!
 //! Activations lie feature by feature, a lane per direction, which suits a product with a matrix and not a sum over
-//! directions. So the gradient g of a block is turned round (direction by direction), and x is read as it lies,
+//! directions. So the gradient g of a block is transposed (direction by direction), and x is read as it lies,
 //! one number against two vectors of g. A register tile of 8 × 2 vectors (4 × 2 where there are 16 registers) runs
 //! over the directions of the block.
 
@@ -16,7 +16,7 @@ const WIDE: usize = 2;
 /// Outputs of a panel for one direction, or of a sum for one input.
 pub(super) type Wide<S> = [<S as Simd>::f32s; WIDE];
 
-/// Panels for so many outputs.
+/// Panels for this many outputs.
 pub(super) fn panels<S: Simd>(outputs: usize) -> usize {
     outputs.div_ceil(WIDE * S::F32_LANES)
 }
@@ -26,34 +26,34 @@ pub(super) fn lanes<S: Simd>() -> usize {
     VECTORS * S::F32_LANES
 }
 
-/// A block's gradient, turned round.
+/// A block's gradient, transposed.
 pub(super) struct Outer<'a, S: Simd> {
-    turned: &'a [Wide<S>],
+    transposed: &'a [Wide<S>],
     bfloat16: Option<Bfloat16>,
 }
 
 impl<'a, S: Simd> Outer<'a, S> {
-    /// The rows of a gradient into `room`, panel by panel, in each direction by direction. What `room` holds beyond the
-    /// last row stays.
+    /// The rows of a gradient into `workspace`, panel by panel, in each direction by direction. What `workspace` holds
+    /// beyond the last row stays.
     #[inline(always)]
-    pub(super) fn new(bfloat16: Option<Bfloat16>, rows: &[Row<S>], room: &'a mut [Wide<S>]) -> Self {
+    pub(super) fn new(bfloat16: Option<Bfloat16>, rows: &[Row<S>], workspace: &'a mut [Wide<S>]) -> Self {
         match bfloat16 {
-            None => turn_round::<S>(rows, room),
-            Some(token) => token.turn_round(bytemuck::cast_slice(rows), bytemuck::cast_slice_mut(room)),
+            None => transpose::<S>(rows, workspace),
+            Some(token) => token.transpose(bytemuck::cast_slice(rows), bytemuck::cast_slice_mut(workspace)),
         }
-        Self { turned: room, bfloat16 }
+        Self { transposed: workspace, bfloat16 }
     }
 
     /// Adds x gᵀ of a block to `sums`, which lie panel by panel, in each input by input.
     #[inline(always)]
     pub(super) fn add(&self, simd: S, x: &[Row<S>], sums: &mut [Wide<S>]) {
         match self.bfloat16 {
-            None => add(simd, x, self.turned, sums),
+            None => add(simd, x, self.transposed, sums),
             Some(token) => {
-                let [x, turned] = [x.as_flattened(), self.turned.as_flattened()];
+                let [x, transposed] = [x.as_flattened(), self.transposed.as_flattened()];
                 token.add(
                     bytemuck::cast_slice(x),
-                    bytemuck::cast_slice(turned),
+                    bytemuck::cast_slice(transposed),
                     bytemuck::cast_slice_mut(sums),
                 );
             }
@@ -62,7 +62,7 @@ impl<'a, S: Simd> Outer<'a, S> {
 }
 
 #[inline(always)]
-pub(super) fn turn_round<S: Simd>(rows: &[Row<S>], out: &mut [Wide<S>]) {
+pub(super) fn transpose<S: Simd>(rows: &[Row<S>], out: &mut [Wide<S>]) {
     let (lanes, wide) = (lanes::<S>(), WIDE * S::F32_LANES);
     let flat: &[f32] = bytemuck::cast_slice(rows.as_flattened());
     let out: &mut [f32] = bytemuck::cast_slice_mut(out.as_flattened_mut());

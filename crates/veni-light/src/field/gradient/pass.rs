@@ -7,9 +7,9 @@ use crate::field::Folded;
 use crate::field::block::{Row, encode, product, scatter};
 use crate::field::mlp::{Mlp, PANEL};
 
-/// Where the way back passes, and the gradient there. Called in the order of that way: the output, the last layer
+/// Hooks of the backward pass, given the gradient there. Called in the order of that pass: the output, the last layer
 /// from its second norm to its first, …, what is added before the first layer, the directional inputs.
-pub(super) trait Stations<S: Simd> {
+pub(super) trait BackwardVisitor<S: Simd> {
     /// By what is added before the first layer (`at` = 0), or after `at` layers.
     fn added(&mut self, simd: S, at: usize, gradient: &[Row<S>]);
 
@@ -37,7 +37,7 @@ pub(super) trait Stations<S: Simd> {
     fn input(&mut self, _simd: S, _features: &[Row<S>], _gradient: &[Row<S>]) {}
 }
 
-/// What a layer leaves for the way back.
+/// What a layer keeps for the backward pass.
 pub(super) struct Tape<'a, S: Simd> {
     /// Standardised input of the first norm.
     pub(super) first: &'a mut [Row<S>],
@@ -72,7 +72,7 @@ pub(super) struct Pass<'a, S: Simd> {
     direction: &'a mut [Row<S>],
     /// Log radiance without the exposure, after [`Pass::forward`].
     pub(super) rgb: &'a mut [Row<S>],
-    /// The gradient by log radiance, for [`Pass::backward`]; its rows beyond the third are 0.
+    /// The gradient with respect to log radiance, for [`Pass::backward`]; its rows beyond the third are 0.
     pub(super) adjoint: &'a mut [Row<S>],
     /// What the output layer is given.
     last: &'a mut [Row<S>],
@@ -96,25 +96,25 @@ impl<'a, S: Simd> Pass<'a, S> {
         4 + 2 * PANEL + 3 * mlp.padded() + widest + encoded + mlp.layers.len() * Tape::<S>::rows(mlp)
     }
 
-    /// In the first rows of `room`; the others are given back.
+    /// In the first rows of `workspace`; the others are given back.
     #[inline(always)]
     pub(super) fn new(
         simd: S,
         mlp: &'a Mlp,
         folded: &'a Folded,
-        room: &'a mut [Row<S>],
+        workspace: &'a mut [Row<S>],
     ) -> (Self, &'a mut [Row<S>]) {
         let features: Vec<_> = features(mlp).collect();
         let (padded, widest) = (mlp.padded(), features.iter().copied().max().unwrap_or(0));
-        let (direction, room) = room.split_at_mut(4);
-        let (rgb, room) = room.split_at_mut(PANEL);
-        let (adjoint, room) = room.split_at_mut(PANEL);
-        let (last, room) = room.split_at_mut(padded);
-        let (x, room) = room.split_at_mut(padded);
-        let (y, room) = room.split_at_mut(padded);
-        let (back, room) = room.split_at_mut(widest);
-        let (encodings, room) = room.split_at_mut(features.iter().sum());
-        let (tapes, room) = room.split_at_mut(mlp.layers.len() * Tape::<S>::rows(mlp));
+        let (direction, workspace) = workspace.split_at_mut(4);
+        let (rgb, workspace) = workspace.split_at_mut(PANEL);
+        let (adjoint, workspace) = workspace.split_at_mut(PANEL);
+        let (last, workspace) = workspace.split_at_mut(padded);
+        let (x, workspace) = workspace.split_at_mut(padded);
+        let (y, workspace) = workspace.split_at_mut(padded);
+        let (back, workspace) = workspace.split_at_mut(widest);
+        let (encodings, workspace) = workspace.split_at_mut(features.iter().sum());
+        let (tapes, workspace) = workspace.split_at_mut(mlp.layers.len() * Tape::<S>::rows(mlp));
         adjoint.as_flattened_mut().fill(simd.splat_f32s(0.0));
         let zeros = vec![0.0; padded.max(widest)];
         let pass = Self {
@@ -132,7 +132,7 @@ impl<'a, S: Simd> Pass<'a, S> {
             tapes,
             zeros,
         };
-        (pass, room)
+        (pass, workspace)
     }
 
     /// At most a block of directions to log radiance.
@@ -167,29 +167,29 @@ impl<'a, S: Simd> Pass<'a, S> {
 
     /// From [`Pass::adjoint`] back to the inputs of the block that went forward last. May be called again.
     #[inline(always)]
-    pub(super) fn backward(&mut self, simd: S, stations: &mut impl Stations<S>) {
+    pub(super) fn backward(&mut self, simd: S, visitor: &mut impl BackwardVisitor<S>) {
         let Self {
             mlp, folded, features, direction, adjoint, last, x, y, back, encodings, tapes, zeros, ..
         } = self;
         let (transposed, hidden, padded) = (mlp.transposed(), mlp.hidden, mlp.padded());
-        stations.output(simd, &last[..hidden], adjoint);
+        visitor.output(simd, &last[..hidden], adjoint);
         product::<S, false, false>(simd, &transposed.output, zeros, adjoint, x);
         for (l, layer) in mlp.layers.iter().enumerate().rev() {
             let rows = Tape::<S>::rows(mlp);
             let tape = Tape::<S>::split(&mut tapes[l * rows..][..rows], padded);
-            stations.added(simd, l + 1, &x[..hidden]);
-            stations.second_norm(simd, l, &x[..hidden], &tape.second[..hidden]);
+            visitor.added(simd, l + 1, &x[..hidden]);
+            visitor.second_norm(simd, l, &x[..hidden], &tape.second[..hidden]);
             unstandardise(simd, x, &layer.gamma2, &tape.second[..hidden], tape.scales[1]);
             let [ff1, ff2] = &transposed.layers[l];
             product::<S, false, false>(simd, ff2, zeros, x, y);
             mask(simd, y, tape.units);
-            stations.feed_forward(simd, l, &tape, [&y[..hidden], &x[..hidden]]);
+            visitor.feed_forward(simd, l, &tape, [&y[..hidden], &x[..hidden]]);
             // added to the way round the branch
             product::<S, true, false>(simd, ff1, zeros, y, x);
-            stations.first_norm(simd, l, &x[..hidden], &tape.first[..hidden]);
+            visitor.first_norm(simd, l, &x[..hidden], &tape.first[..hidden]);
             unstandardise(simd, x, &layer.gamma1, &tape.first[..hidden], tape.scales[0]);
         }
-        stations.added(simd, 0, &x[..hidden]);
+        visitor.added(simd, 0, &x[..hidden]);
         let mut from = 0;
         for ((chunk, matrix), rows) in mlp.input.iter().zip(&transposed.input).zip(features.iter()) {
             product::<S, false, false>(simd, matrix, zeros, x, back);
@@ -197,11 +197,11 @@ impl<'a, S: Simd> Pass<'a, S> {
             // the last two inputs, d_z and |d_xy|, are beyond the latent's vectors
             let inputs = chunk.inputs.start..chunk.inputs.end.min(folded.vectors.len());
             unencode(simd, inputs, features, back, |j, v, gradient| {
-                stations.product(simd, j, v, gradient, [direction[0][v], direction[1][v]]);
+                visitor.product(simd, j, v, gradient, [direction[0][v], direction[1][v]]);
             });
             from += rows;
         }
-        stations.input(simd, encodings, &x[..hidden]);
+        visitor.input(simd, encodings, &x[..hidden]);
     }
 }
 

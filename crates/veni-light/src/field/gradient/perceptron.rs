@@ -1,9 +1,10 @@
-//! The decoder for several latents, with the gradient by its weights too: what training runs in place of tensor
+//! The decoder for several latents, with the gradient with respect to its weights too: what training runs in place of tensor
 //! operations.
 //!
 //! Conditioning (latent to [`Conditioned`]) is a few small matrices and stays with whoever trains; here is what runs for
-//! every direction. The way back takes the derivatives by log radiance, so that a loss may look at whole images. It
-//! goes forward once more, block by block: keeping the activations of a batch costs more time in memory than that.
+//! every direction. The way back takes the derivatives with respect to log radiance, so that a loss may look at whole
+//! images. It goes forward once more, block by block: keeping the activations of a batch costs more time in memory than
+//! that.
 //!
 //! Directions are split into tasks by their number alone and tasks are added in order: the same bits whatever the
 //! number of threads.
@@ -43,7 +44,7 @@ pub struct Gradients {
     pub weights: Vec<(String, Vec<f32>)>,
 }
 
-/// Gradients by what conditioning leaves of a latent.
+/// Gradients with respect to what conditioning leaves of a latent.
 #[derive(Clone, Debug)]
 pub struct ConditionedGradient {
     /// By x and y of the N latent vectors, through the directional input.
@@ -101,18 +102,18 @@ impl Perceptron {
         out
     }
 
-    /// The gradient of Σ slope · log radiance; `slopes` are as [`Perceptron::forward`] returns log radiance.
+    /// The gradient of Σ gradient · log radiance; `gradients` are as [`Perceptron::forward`] returns log radiance.
     pub fn backward(
         &self,
         images: &[Conditioned],
         directions: &[&[[f32; 3]]],
-        slopes: &[[f32; 3]],
+        gradients: &[[f32; 3]],
     ) -> Gradients {
         let mlp = &self.mlp;
         let all: usize = directions.iter().map(|d| d.len()).sum();
         let task = all.div_ceil(TASKS).max(BACKWARD);
         let mut parts = Vec::new();
-        let mut rest = slopes;
+        let mut rest = gradients;
         for (i, (image, directions)) in images.iter().zip(directions).enumerate() {
             let even = directions.len().div_ceil(directions.len().div_ceil(task).max(1)).max(1);
             for directions in directions.chunks(even) {
@@ -124,14 +125,14 @@ impl Perceptron {
         let parts = tasks::map(
             parts.into_iter(),
             Aligned::default,
-            |scratch, (i, Conditioned(folded), directions, slopes)| {
+            |scratch, (i, Conditioned(folded), directions, gradients)| {
                 let mut sums = Sums::new(mlp, folded.vectors.len());
                 let mut weights = WeightSums::new(mlp);
                 pulp::Arch::new().dispatch(Backward {
                     mlp,
                     folded,
                     directions,
-                    loss: &|i, _| (0.0, slopes[i]),
+                    loss: &|i, _| (0.0, gradients[i]),
                     sums: &mut sums,
                     weights: Some(&mut weights),
                     scratch,

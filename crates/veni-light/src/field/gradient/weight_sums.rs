@@ -1,4 +1,4 @@
-//! Gradients by the weights that meet a direction, summed over directions.
+//! Gradients with respect to the weights that meet a direction, summed over directions.
 
 use pulp::Simd;
 
@@ -26,7 +26,7 @@ pub(in crate::field) fn layout(mlp: &Mlp) -> Vec<(String, usize)> {
     all
 }
 
-/// The vectors of a layer, in the order of [`LayerRoom::vectors`].
+/// The vectors of a layer, in the order of [`LayerWorkspace::vectors`].
 const VECTORS: [&str; 5] = ["norm1.gamma", "norm1.beta", "ff1.bias", "ff2.bias", "norm2.gamma"];
 
 impl WeightSums {
@@ -41,28 +41,28 @@ impl WeightSums {
     }
 }
 
-/// Room for the sums of one task, as the kernels leave them.
-pub(super) struct WeightRoom<'a, S: Simd> {
-    /// A block's gradient by the outputs of a matrix, direction by direction.
-    turned: &'a mut [Wide<S>],
+/// Workspace for the sums of one task, as the kernels leave them.
+pub(super) struct WeightWorkspace<'a, S: Simd> {
+    /// A block's gradient with respect to the outputs of a matrix, direction by direction.
+    transposed: &'a mut [Wide<S>],
     bfloat16: Option<Bfloat16>,
     /// One per chunk of directional inputs.
     pub(super) input: Vec<&'a mut [Wide<S>]>,
-    pub(super) layers: Vec<LayerRoom<'a, S>>,
+    pub(super) layers: Vec<LayerWorkspace<'a, S>>,
     /// A vector per entry of the transposed output matrix [3, h].
     pub(super) output: &'a mut [S::f32s],
     pub(super) output_bias: &'a mut [S::f32s],
 }
 
 /// Sums of one layer.
-pub(super) struct LayerRoom<'a, S: Simd> {
+pub(super) struct LayerWorkspace<'a, S: Simd> {
     pub(super) ff1: &'a mut [Wide<S>],
     pub(super) ff2: &'a mut [Wide<S>],
     /// γ₁, β₁, the two biases, γ₂: h vectors each.
     pub(super) vectors: [&'a mut [S::f32s]; 5],
 }
 
-/// Which of [`LayerRoom::vectors`].
+/// Which of [`LayerWorkspace::vectors`].
 pub(super) mod vector {
     pub(in super::super) const GAMMA1: usize = 0;
     pub(in super::super) const BETA1: usize = 1;
@@ -71,7 +71,7 @@ pub(super) mod vector {
     pub(in super::super) const GAMMA2: usize = 4;
 }
 
-impl<'a, S: Simd> WeightRoom<'a, S> {
+impl<'a, S: Simd> WeightWorkspace<'a, S> {
     /// SIMD vectors that it takes.
     pub(super) fn vectors(mlp: &Mlp) -> usize {
         let (h, panels) = (mlp.hidden, outer::panels::<S>(mlp.hidden));
@@ -81,26 +81,26 @@ impl<'a, S: Simd> WeightRoom<'a, S> {
     }
 
     /// All zero.
-    pub(super) fn new(simd: S, mlp: &Mlp, room: &'a mut [S::f32s]) -> Self {
+    pub(super) fn new(simd: S, mlp: &Mlp, workspace: &'a mut [S::f32s]) -> Self {
         let (h, panels) = (mlp.hidden, outer::panels::<S>(mlp.hidden));
-        room.fill(simd.splat_f32s(0.0));
-        let mut rest = room;
-        let turned = take_wide::<S>(&mut rest, panels * outer::lanes::<S>());
+        workspace.fill(simd.splat_f32s(0.0));
+        let mut rest = workspace;
+        let transposed = take_wide::<S>(&mut rest, panels * outer::lanes::<S>());
         let input = mlp.input.iter().map(|c| take_wide::<S>(&mut rest, panels * c.weight.inputs)).collect();
-        let layers = mlp.layers.iter().map(|_| LayerRoom {
+        let layers = mlp.layers.iter().map(|_| LayerWorkspace {
             ff1: take_wide::<S>(&mut rest, panels * h),
             ff2: take_wide::<S>(&mut rest, panels * h),
             vectors: std::array::from_fn(|_| take(&mut rest, h)),
         });
         let layers = layers.collect();
         let (output, output_bias) = (take(&mut rest, 3 * h), take(&mut rest, 3));
-        Self { turned, bfloat16: mlp.bfloat16(), input, layers, output, output_bias }
+        Self { transposed, bfloat16: mlp.bfloat16(), input, layers, output, output_bias }
     }
 
     /// x gᵀ for the directional inputs; every chunk's features fill whole panels of `encodings`.
     #[inline(always)]
     pub(super) fn add_input(&mut self, simd: S, mlp: &Mlp, encodings: &[Row<S>], gradient: &[Row<S>]) {
-        let outer = outer::Outer::new(self.bfloat16, gradient, self.turned);
+        let outer = outer::Outer::new(self.bfloat16, gradient, self.transposed);
         let mut from = 0;
         for (chunk, sums) in mlp.input.iter().zip(&mut self.input) {
             let inputs = chunk.weight.inputs;
@@ -112,14 +112,14 @@ impl<'a, S: Simd> WeightRoom<'a, S> {
     /// x gᵀ for the first feed-forward map of layer `l`.
     #[inline(always)]
     pub(super) fn add_ff1(&mut self, simd: S, l: usize, x: &[Row<S>], gradient: &[Row<S>]) {
-        let outer = outer::Outer::new(self.bfloat16, gradient, self.turned);
+        let outer = outer::Outer::new(self.bfloat16, gradient, self.transposed);
         outer.add(simd, x, self.layers[l].ff1);
     }
 
     /// x gᵀ for the second.
     #[inline(always)]
     pub(super) fn add_ff2(&mut self, simd: S, l: usize, x: &[Row<S>], gradient: &[Row<S>]) {
-        let outer = outer::Outer::new(self.bfloat16, gradient, self.turned);
+        let outer = outer::Outer::new(self.bfloat16, gradient, self.transposed);
         outer.add(simd, x, self.layers[l].ff2);
     }
 
@@ -137,29 +137,29 @@ impl<'a, S: Simd> WeightRoom<'a, S> {
             head
         };
         let input = next(5 * m * h);
-        for (chunk, room) in mlp.input.iter().zip(&self.input) {
+        for (chunk, workspace) in mlp.input.iter().zip(&self.input) {
             for k in 0..chunk.weight.inputs {
                 let row = stored_row(m, chunk.inputs.start + k / 5, k % 5);
-                outer::read::<S>(room, chunk.weight.inputs, k, &mut input[row * h..][..h]);
+                outer::read::<S>(workspace, chunk.weight.inputs, k, &mut input[row * h..][..h]);
             }
         }
         let total = |v: &S::f32s| -> f32 {
             bytemuck::cast_slice::<S::f32s, f32>(std::slice::from_ref(v)).iter().sum()
         };
-        for (layer, room) in mlp.layers.iter().zip(&self.layers) {
-            let bias: Vec<f32> = room.vectors[vector::FF1_BIAS].iter().map(total).collect();
+        for (layer, workspace) in mlp.layers.iter().zip(&self.layers) {
+            let bias: Vec<f32> = workspace.vectors[vector::FF1_BIAS].iter().map(total).collect();
             let ff1 = next(h * h);
             for (k, row) in ff1.chunks_exact_mut(h).enumerate() {
                 let mut products = vec![0.0; h];
-                outer::read::<S>(room.ff1, h, k, &mut products);
+                outer::read::<S>(workspace.ff1, h, k, &mut products);
                 for ((out, product), bias) in row.iter_mut().zip(products).zip(&bias) {
                     *out += layer.gamma1[k] * product + layer.beta1[k] * bias;
                 }
             }
             for (k, row) in next(h * h).chunks_exact_mut(h).enumerate() {
-                outer::read::<S>(room.ff2, h, k, row);
+                outer::read::<S>(workspace.ff2, h, k, row);
             }
-            for vectors in &room.vectors {
+            for vectors in &workspace.vectors {
                 for (out, vector) in next(h).iter_mut().zip(vectors.iter()) {
                     *out += total(vector);
                 }

@@ -1,4 +1,4 @@
-//! Numbers of the authors' program. Their tolerance rule: |ours − golden| ≤ max(10 f32_err, 1e-6 + 1e-5 max_abs).
+//! Numbers of the reference implementation. Their tolerance rule: |ours − golden| ≤ max(10 f32_err, 1e-6 + 1e-5 max_abs).
 //!
 //! Their directions and latents are used as they stand: the decoder needs them in one frame, whichever it is.
 

@@ -15,8 +15,8 @@ fn loss(i: usize, p: [f64; 3]) -> (f64, [f64; 3]) {
 fn gradient(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> Gradient {
     let field = model.decoder().unwrap().condition(latent).unwrap();
     field.gradient(directions, |i, p| {
-        let (value, slope) = loss(i, p.map(f64::from));
-        (value, slope.map(|g| g as f32))
+        let (value, by_output) = loss(i, p.map(f64::from));
+        (value, by_output.map(|g| g as f32))
     })
 }
 
@@ -80,7 +80,7 @@ fn the_papers_size_agrees_too() {
 
 #[test]
 fn a_wrong_sign_in_the_target_is_seen() {
-    // the comparison above is no rubber stamp: the gradient at another latent does not pass it
+    // the comparison above is not a rubber stamp: the gradient at another latent does not pass it
     let model = odd(2, 16, VnReluForm::Projection);
     let [one, other] = [1, 2].map(|seed| Latent::from_seed(&Prior::standard(2), seed));
     let directions = directions(40);
@@ -130,8 +130,8 @@ fn the_number_of_threads_changes_no_bit_and_no_direction_is_lost() {
     let mut sum = [[0.0f64; 3]; 3];
     for (i, d) in directions.iter().enumerate() {
         let one = field.gradient(std::slice::from_ref(d), |_, p| {
-            let (value, slope) = loss(i, p.map(f64::from));
-            (value, slope.map(|g| g as f32))
+            let (value, by_output) = loss(i, p.map(f64::from));
+            (value, by_output.map(|g| g as f32))
         });
         for (sum, g) in sum.as_flattened_mut().iter_mut().zip(one.vectors.as_flattened()) {
             *sum += f64::from(*g);

@@ -2,17 +2,17 @@
 
 use super::reference::Plain;
 use super::*;
-use crate::field::{Curved, NormalEquations};
+use crate::field::{LocalQuadratic, NormalEquations};
 use crate::latent::{Latent, Prior};
 
 /// Σ w (p − t)² with weights and targets of every channel its own; every third direction counts nothing.
-fn loss(i: usize, p: [f32; 3]) -> Curved {
+fn loss(i: usize, p: [f32; 3]) -> LocalQuadratic {
     let weight = [0, 1, 2].map(|c| if i % 3 == 2 { 0.0 } else { 0.5 + ((i + 2 * c) % 7) as f32 });
     let error = [0, 1, 2].map(|c| p[c] - 0.3 * c as f32 + (i % 5) as f32 * 0.2);
-    Curved {
+    LocalQuadratic {
         loss: (0..3).map(|c| f64::from(weight[c] * error[c] * error[c])).sum(),
-        slope: [0, 1, 2].map(|c| 2.0 * weight[c] * error[c]),
-        curvature: weight.map(|w| 2.0 * w),
+        gradient: [0, 1, 2].map(|c| 2.0 * weight[c] * error[c]),
+        weight: weight.map(|w| 2.0 * w),
     }
 }
 
@@ -51,11 +51,11 @@ fn expected(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> (Vec<[f3
     let (mut kept, mut matrix) = (Vec::new(), vec![0.0; unknowns * unknowns]);
     for d in directions {
         let Some(rows) = rows(d) else { continue };
-        let curvature = loss(kept.len(), [0.0; 3]).curvature.map(f64::from);
+        let weight = loss(kept.len(), [0.0; 3]).weight.map(f64::from);
         kept.push(*d);
         for (j, a) in rows.iter().enumerate() {
             for (k, b) in rows.iter().enumerate() {
-                matrix[j * unknowns + k] += (0..3).map(|c| curvature[c] * a[c] * b[c]).sum::<f64>();
+                matrix[j * unknowns + k] += (0..3).map(|c| weight[c] * a[c] * b[c]).sum::<f64>();
             }
         }
     }
@@ -96,8 +96,8 @@ fn the_gradient_is_that_of_the_other_kernel_and_a_wrong_matrix_is_seen() {
     let equations = found(&model, &at(3), &directions);
     let field = model.decoder().unwrap().condition(&at(3)).unwrap();
     let gradient = field.gradient(&directions, |i, p| {
-        let Curved { loss, slope, .. } = loss(i, p);
-        (loss, slope)
+        let LocalQuadratic { loss, gradient, .. } = loss(i, p);
+        (loss, gradient)
     });
     let flat = gradient.vectors.as_flattened().iter().chain([&gradient.log_exposure]);
     let flat: Vec<f64> = flat.map(|g| f64::from(*g)).collect();

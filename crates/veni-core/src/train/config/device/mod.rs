@@ -24,11 +24,11 @@ pub use numbers::Devices;
 
 use crate::Result;
 
-/// What computes the decoder and its gradients in training: the same numbers up to rounding, which
-/// [`DecoderBy::KernelsBfloat16`] does more coarsely.
+/// The decoder backend, which computes the decoder and its gradients in training: the same numbers up to rounding, which
+/// [`DecoderBackend::KernelsBfloat16`] does more coarsely.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum DecoderBy {
+pub enum DecoderBackend {
     /// The vectorised kernels of [`field`](veni_light::field), on the processor ([`Native`](crate::vae::Native)) whatever
     /// the device. A network that does not fold per latent is computed by tensor operations all the same.
     #[default]
@@ -40,7 +40,7 @@ pub enum DecoderBy {
     KernelsBfloat16,
 }
 
-impl DecoderBy {
+impl DecoderBackend {
     /// Whether this machine computes so.
     ///
     /// # Errors
@@ -90,10 +90,10 @@ impl DeviceKind {
         [Self::Cuda, Self::Wgpu].into_iter().find(|kind| real(*kind)).unwrap_or(Self::Flex)
     }
 
-    /// What computes the decoder best here: kernels on a processor, tensor operations on any other device, whose data
+    /// The best decoder backend here: kernels on a processor, tensor operations on any other device, whose data
     /// would have to come to the processor and back.
-    pub fn decoder_by(self) -> DecoderBy {
-        if self.is_processor() { DecoderBy::Kernels } else { DecoderBy::Tensors }
+    pub fn decoder_backend(self) -> DecoderBackend {
+        if self.is_processor() { DecoderBackend::Kernels } else { DecoderBackend::Tensors }
     }
 
     /// Whether it is the processor, through one of burn's backends for it.

@@ -1,7 +1,7 @@
 //! What follows from a device, and what is said where there is none. What devices compute is compared in
 //! `train::device_tests`.
 
-use super::{DecoderBy, DeviceKind};
+use super::{DecoderBackend, DeviceKind};
 use crate::train::config::TrainConfig;
 use crate::train::presets::Preset;
 
@@ -10,26 +10,26 @@ fn a_graphics_device_brings_the_tensor_decoder_along() {
     let config = Preset::Tiny.config(3);
     let with = |overrides: &[&str]| {
         let config = config.with_overrides(overrides).unwrap();
-        (config.device, config.decoder_by)
+        (config.device, config.decoder_backend)
     };
-    assert_eq!(with(&[]), (DeviceKind::Flex, DecoderBy::Kernels));
-    assert_eq!(with(&["device=ndarray"]), (DeviceKind::Ndarray, DecoderBy::Kernels));
-    assert_eq!(with(&["device=wgpu"]), (DeviceKind::Wgpu, DecoderBy::Tensors));
+    assert_eq!(with(&[]), (DeviceKind::Flex, DecoderBackend::Kernels));
+    assert_eq!(with(&["device=ndarray"]), (DeviceKind::Ndarray, DecoderBackend::Kernels));
+    assert_eq!(with(&["device=wgpu"]), (DeviceKind::Wgpu, DecoderBackend::Tensors));
     // what is named stays, in either order
     for order in [["device=wgpu", "decoder_by=kernels"], ["decoder_by=kernels", "device=wgpu"]] {
-        assert_eq!(with(&order), (DeviceKind::Wgpu, DecoderBy::Kernels));
+        assert_eq!(with(&order), (DeviceKind::Wgpu, DecoderBackend::Kernels));
     }
     // in a file too: left out it follows the device, written it stays
     let text = config.with_overrides(&["device=cuda"]).unwrap().to_toml().unwrap();
     let line = "decoder_by = \"tensors\"\n";
     assert!(text.contains(line), "{text}");
-    let read = |text: &str| TrainConfig::from_toml(text).unwrap().decoder_by;
-    assert_eq!(read(&text), DecoderBy::Tensors);
-    assert_eq!(read(&text.replace(line, "")), DecoderBy::Tensors);
-    assert_eq!(read(&text.replace(line, "decoder_by = \"kernels\"\n")), DecoderBy::Kernels);
+    let read = |text: &str| TrainConfig::from_toml(text).unwrap().decoder_backend;
+    assert_eq!(read(&text), DecoderBackend::Tensors);
+    assert_eq!(read(&text.replace(line, "")), DecoderBackend::Tensors);
+    assert_eq!(read(&text.replace(line, "decoder_by = \"kernels\"\n")), DecoderBackend::Kernels);
     assert_eq!(
         read(&config.to_toml().unwrap().replace("decoder_by = \"kernels\"\n", "")),
-        DecoderBy::Kernels
+        DecoderBackend::Kernels
     );
 }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// The whole chain, encoder to weighted loss: the analytic slope along a random direction of each parameter
+/// The whole chain, encoder to weighted loss: the analytic derivative along a random direction of each parameter
 /// tensor against a central difference.
 #[test]
 fn gradients_of_the_whole_loss_match_finite_differences() {
@@ -37,7 +37,7 @@ fn gradients_match(run: &Path, config: TrainConfig) {
     let device = DeviceKind::Flex.device().unwrap().autodiff();
     let loss_of = &Network::loss(trainer.config(), &device);
     let value = |veni: &Network| veni.terms(&batch, loss_of, &device).total();
-    let both = [DecoderBy::Tensors, DecoderBy::Kernels].map(|by| {
+    let both = [DecoderBackend::Tensors, DecoderBackend::Kernels].map(|by| {
         let (terms, gradients) = veni.gradients(&batch, loss_of, by, &device);
         (terms.total().into_scalar::<f32>(), weights::gradients(&veni, "", &gradients))
     });
@@ -53,14 +53,14 @@ fn gradients_match(run: &Path, config: TrainConfig) {
     let start = weights::read(&veni, "");
     let mut checked = 0;
     for (slot, (name, gradient)) in (0..).zip(&gradients) {
-        // along the gradient, where the slope is large, and a random direction, so that no component hides
+        // along the gradient, where the derivative is large, and a random direction, so that no component hides
         let mut rng = stream(5, Purpose::Fit, 0, slot);
         let random: Vec<f64> = gradient.data.iter().map(|_| rng.normal()).collect();
         let gradient: Vec<f64> = gradient.data.iter().map(|g| f64::from(*g)).collect();
         let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-30);
         let (a, b) = (length(&gradient), length(&random));
         let direction: Vec<f64> = gradient.iter().zip(&random).map(|(g, r)| g / a + r / b).collect();
-        let slope: f64 = direction.iter().zip(&gradient).map(|(d, g)| d * g).sum();
+        let derivative: f64 = direction.iter().zip(&gradient).map(|(d, g)| d * g).sum();
         let at = |h: f64| {
             let mut moved = start.clone();
             let data = &mut moved.get_mut(name).unwrap().data;
@@ -72,13 +72,16 @@ fn gradients_match(run: &Path, config: TrainConfig) {
         // within the step it has one of order h. One of the steps must agree.
         let difference = |h: f64| (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
         let differences = [2e-3, 5e-4, 1e-4].map(difference);
-        let error = differences.iter().map(|d| (d - slope).abs()).fold(f64::INFINITY, f64::min);
-        assert!(error < 1e-3 + 0.02 * slope.abs(), "{name}: differences {differences:?}, gradient {slope}");
-        checked += usize::from(slope.abs() > 1e-2);
+        let error = differences.iter().map(|d| (d - derivative).abs()).fold(f64::INFINITY, f64::min);
+        assert!(
+            error < 1e-3 + 0.02 * derivative.abs(),
+            "{name}: differences {differences:?}, gradient {derivative}"
+        );
+        checked += usize::from(derivative.abs() > 1e-2);
     }
     assert!(
         checked > gradients.len() / 2,
-        "only {checked} of {} slopes rise above the noise",
+        "only {checked} of {} derivatives rise above the noise",
         gradients.len()
     );
 }

@@ -1,7 +1,7 @@
 //! Runs on panoramas that are in a file.
 
 use super::*;
-use veni_data::Holding;
+use veni_data::PixelStorage;
 
 /// The run with all panoramas in files.
 fn beyond_memory(config: &TrainConfig) -> TrainConfig {
@@ -76,8 +76,8 @@ fn a_resumed_run_holds_its_panoramas_elsewhere_and_ends_with_the_same_weights() 
     assert!(Trainer::resume(&moved, "test").unwrap_err().to_string().contains("gone"));
     let panorama = 12 * (width * height) as u64;
     for (memory_mib, mapped) in [(Some(100), 0), (None, 2 * panorama), (Some(0), (3 + 2) * panorama)] {
-        let holding = Holding { memory_mib, scratch: Some(scratch.clone()) };
-        let mut trainer = Trainer::resume_heard(&moved, "test", &holding, &|_, _| {}).unwrap();
+        let storage = PixelStorage { memory_mib, scratch: Some(scratch.clone()) };
+        let mut trainer = Trainer::resume_with(&moved, "test", &storage, &|_, _| {}).unwrap();
         assert_eq!(trainer.mapped_bytes(), mapped, "{memory_mib:?}");
         if memory_mib == Some(0) {
             complete(&mut trainer);

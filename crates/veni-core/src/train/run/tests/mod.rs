@@ -14,7 +14,7 @@ use veni_light::latent::Latent;
 use veni_light::model::Model;
 use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
 use veni_light::sphere::Equirect;
-use crate::train::config::{DecoderBy, DeviceKind, Devices};
+use crate::train::config::{DecoderBackend, DeviceKind, Devices};
 use crate::train::loss::LossForm;
 use crate::train::presets::Preset;
 use veni_fit::schedule::{LearningRate, WeightSchedule};

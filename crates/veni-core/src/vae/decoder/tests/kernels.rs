@@ -31,10 +31,10 @@ fn setup([hidden, layers, n, rays]: [usize; 4]) -> (Decoder, Tensor<3>, Tensor<3
     (decoder, latent, directions)
 }
 
-/// Log radiance, and the gradients of Σ slope · log radiance by parameters and by the latent.
+/// Log radiance, and the gradients of Σ g · log radiance by parameters and by the latent.
 type Found = (Vec<f32>, weights::Weights);
 
-fn slope(i: usize) -> f32 {
+fn output_gradient(i: usize) -> f32 {
     (0.7 * i as f32).cos()
 }
 
@@ -46,9 +46,9 @@ fn with_latent(mut gradients: weights::Weights, latent: &Tensor<3>) -> weights::
 
 fn by_tensors(decoder: &Decoder, latent: &Tensor<3>, directions: Tensor<3>) -> Found {
     let image = decoder.forward_per_image(latent.clone(), directions);
-    let slopes: Vec<f32> = (0..values(&image).len()).map(slope).collect();
-    let slopes = Tensor::from_data(TensorData::new(slopes, image.dims()), &image.device());
-    let gradients = (image.clone() * slopes).sum().backward();
+    let by_output: Vec<f32> = (0..values(&image).len()).map(output_gradient).collect();
+    let by_output = Tensor::from_data(TensorData::new(by_output, image.dims()), &image.device());
+    let gradients = (image.clone() * by_output).sum().backward();
     let found = weights::gradients(decoder, "", &gradients);
     (values(&image), with_latent(found, &latent.grad(&gradients).unwrap()))
 }
@@ -56,8 +56,8 @@ fn by_tensors(decoder: &Decoder, latent: &Tensor<3>, directions: Tensor<3>) -> F
 fn by_kernels(decoder: &Decoder, latent: &Tensor<3>, directions: &[[f32; 3]], rays: usize) -> Found {
     let native = decoder.native(latent.clone()).unwrap();
     let image = native.forward(directions, rays);
-    let slopes: Vec<f32> = (0..image.len()).map(slope).collect();
-    let gradients = native.backward(directions, rays, &slopes).backward();
+    let by_output: Vec<f32> = (0..image.len()).map(output_gradient).collect();
+    let gradients = native.backward(directions, rays, &by_output).backward();
     let found = weights::gradients(decoder, "", &gradients);
     (image, with_latent(found, &latent.grad(&gradients).unwrap()))
 }

@@ -1,28 +1,29 @@
-//! Parameters of a deck of cloud.
+//! Parameters of a cloud layer.
 
 use serde::{Deserialize, Serialize};
 
-/// Whether a deck has height.
+/// Whether a cloud layer has height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DeckKind {
+pub enum CloudKind {
     /// Cumulus and stratocumulus: flat bases, rising tops.
-    Heap,
-    /// Cirrus, altocumulus, altostratus and stratus: a layer without height.
-    Sheet,
+    #[serde(rename = "heap")]
+    Cumulus,
+    /// Cirrus, altocumulus, altostratus and stratus: no height.
+    #[serde(rename = "sheet")]
+    Stratus,
 }
 
-/// One deck of cloud.
+/// One cloud layer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Deck {
-    /// Heap or sheet.
-    pub kind: DeckKind,
+pub struct CloudLayer {
+    /// Cumulus or stratus.
+    pub kind: CloudKind,
     /// Height of the base, km.
     pub base: f32,
     /// From the base to the highest tops, km.
     pub thickness: f32,
-    /// Share of the deck that is cloud, 0 to 1.
+    /// Share of the layer that is cloud, 0 to 1.
     pub cover: f32,
     /// Vertical optical depth where it is dense.
     pub depth: f32,
@@ -32,7 +33,7 @@ pub struct Deck {
     pub stretch: f32,
     /// Bearing of the wind, radians.
     pub wind: f32,
-    /// How ragged the edges and how uneven the sheets are, 0 to 1.
+    /// How ragged the edges and how uneven stratus is, 0 to 1.
     pub ragged: f32,
     /// How much of it falls apart into small cells (altocumulus), 0 to 1.
     pub cells: f32,

@@ -6,7 +6,7 @@ use super::noise::{cell, fractal3};
 
 /// What a solid looks like.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Skin {
+pub(super) enum Material {
     /// One colour, mottled over `size` metres.
     Plain { albedo: Vec3, mottle: f32, size: f32 },
     /// Leaves: ragged, with holes, a little translucent. `open` is the share of holes.
@@ -15,22 +15,22 @@ pub(super) enum Skin {
     Facade { albedo: Vec3, floor: f32, bay: f32, glass: f32, lit: f32 },
 }
 
-impl Skin {
+impl Material {
     /// Albedo at a point with this normal, what shines there by itself (as a share of a lit window), and how much of
     /// a mirror it is. `footprint` is the size of a sample,
     /// `seed` that of the solid.
     pub(super) fn paint(&self, point: Vec3, normal: Vec3, footprint: f32, seed: u32) -> (Vec3, f32, f32) {
         match *self {
-            Skin::Plain { albedo, mottle, size } => {
+            Material::Plain { albedo, mottle, size } => {
                 let detail = (1.0 - footprint / size).clamp(0.0, 1.0);
                 let v = if detail > 0.0 { detail * fractal3(point / size, 4, 0.6, seed) } else { 0.0 };
                 (albedo * (mottle * v).exp(), 0.0, 0.0)
             }
-            Skin::Leaves { albedo, size, .. } => {
+            Material::Leaves { albedo, size, .. } => {
                 let v = fractal3(point * (1.7 / size), 2, 0.7, seed ^ 0x1eaf);
                 (albedo * (0.7 * v).exp(), 0.0, 0.0)
             }
-            Skin::Facade { albedo, floor, bay, glass, lit } => {
+            Material::Facade { albedo, floor, bay, glass, lit } => {
                 let stain = 0.12 * fractal3(point * 0.3, 3, 0.6, seed);
                 let wall = albedo * stain.exp();
                 if normal.z.abs() > 0.3 {

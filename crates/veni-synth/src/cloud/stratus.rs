@@ -1,4 +1,4 @@
-//! Rays through decks without height. MODEL (68).
+//! Rays through cloud layers without height. MODEL (68).
 
 use std::f32::consts::PI;
 
@@ -8,8 +8,8 @@ use super::{Cloud, DIFFUSION, EARTH, Gathered};
 use crate::dome::henyey_greenstein;
 
 impl Cloud {
-    pub(super) fn gather_sheet(&self, direction: Vec3, footprint: f32) -> Option<Gathered> {
-        let d = &self.deck;
+    pub(super) fn gather_stratus(&self, direction: Vec3, footprint: f32) -> Option<Gathered> {
+        let d = &self.layer;
         let up = direction.z.max(0.0);
         let distance = Self::reach(d.base, up);
         let p = Vec2::new(direction.x, direction.y) * distance;
@@ -34,7 +34,7 @@ impl Cloud {
                 * (-0.18 * depth / tilt_sun).exp();
             let flux = (l.direct * tilt_sun.max(sun) + PI * l.sky) / PI;
             let often = flux / (1.0 + DIFFUSION * depth / tilt_sun.max(0.3)) * 3.0 / 7.0 * (1.0 + 2.0 * up);
-            // a thin sheet scatters once, a thick one often
+            // thin stratus scatters once, thick often
             let thick = 1.0 - (-0.5 * depth).exp();
             radiance += seen
                 * (l.direct * once + often * thick + l.sky * 0.5 * (1.0 - thick) + l.ground * 0.3 * thick);
