@@ -6,9 +6,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, anyhow, bail};
+use veni_image::{WriteOptions, write_rows};
 use veni_light::Error;
 use veni_light::output::{self, Overwrite, process_token};
-use veni_image::{WriteOptions, write_rows};
 use veni_light::sphere::Equirect;
 
 /// Attribute of a baked image: the latent's JSON.

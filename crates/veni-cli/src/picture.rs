@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use clap::ValueEnum;
-use veni_light::latent::Latent;
 use veni_image::Panorama;
 use veni_image::tonemap::Tonemap;
+use veni_light::latent::Latent;
 use veni_light::sphere::{Equirect, Frame};
 
 use crate::device::{Baker, Directions};

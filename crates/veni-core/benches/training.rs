@@ -4,14 +4,14 @@
 use std::path::PathBuf;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use veni_data::Splits;
-use veni_light::random::{Purpose, stream};
 use veni_core::train::batch::Batches;
 use veni_core::train::loss::Loss;
 use veni_core::train::optimiser::{Group, Optimiser};
 use veni_core::train::presets::Preset;
 use veni_core::train::step::batch_loss;
 use veni_core::vae::Veni;
+use veni_data::Splits;
+use veni_light::random::{Purpose, stream};
 
 /// As the command line: glibc gives large blocks back to the system and fetches them page by page.
 #[global_allocator]

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use burn::tensor::Device;
 
-use veni_light::field;
 use crate::fit::FitDecoder;
+use crate::vae::{Decoder, Veni, veni};
+use crate::{Error, Result};
+use veni_light::field;
 use veni_light::latent::{Latent, Prior};
 use veni_light::model::{Model, ModelKind};
 use veni_light::sphere::{Equirect, Stripes};
-use crate::vae::{Decoder, Veni, veni};
-use crate::{Error, Result};
 
 /// A model and everything that the protocols ask of it. A model without an encoder (RENI++, or a stripped file) takes part
 /// wherever no encoder is needed.

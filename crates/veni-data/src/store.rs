@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::dataset::Item;
 use super::pixels::{MappedFile, Pixels};
-use veni_light::sphere::Equirect;
 use crate::{Error, Result};
+use veni_light::sphere::Equirect;
 
 const MIB: u64 = 1 << 20;
 

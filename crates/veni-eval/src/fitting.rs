@@ -2,10 +2,10 @@
 
 use serde_json::{Value, json};
 
-use veni_core::LoadedModel;
 use crate::Result;
-use veni_data::coarsen::{averaged, coarse_grid};
+use veni_core::LoadedModel;
 use veni_core::fit::{self, FitConfig, FitResult, FitTarget, Method};
+use veni_data::coarsen::{averaged, coarse_grid};
 use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
 

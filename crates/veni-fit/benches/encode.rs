@@ -8,9 +8,9 @@ mod common;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use veni_fit::Encoder;
 use veni_light::model::EncoderConfig;
 use veni_light::sphere::Equirect;
-use veni_fit::Encoder;
 
 fn encode(criterion: &mut Criterion) {
     let small = EncoderConfig {

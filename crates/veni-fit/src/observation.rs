@@ -115,7 +115,8 @@ impl Observation {
         // a channel that is 0 has no logarithm: the darkest value that is known stands for it
         let counted = radiance.iter().zip(known.iter().flat_map(|k| [*k; 3]));
         let darkest = counted.filter(|(v, k)| *k > 0.0 && **v > 0.0).map(|(v, _)| *v).reduce(f32::min);
-        let darkest = darkest.ok_or_else(|| Error::invalid("no known pixel of the picture has positive radiance"))?;
+        let darkest =
+            darkest.ok_or_else(|| Error::invalid("no known pixel of the picture has positive radiance"))?;
         let mut log_radiance: Vec<f32> = radiance.iter().map(|v| v.max(darkest).ln()).collect();
         let lit = |rgb: &[f32; 3]| f64::from(luminance(rgb.map(|v| v.max(darkest)))).ln();
         let logs: Vec<f64> = radiance.as_chunks().0.iter().map(lit).collect();

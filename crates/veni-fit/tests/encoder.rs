@@ -6,9 +6,9 @@ mod common;
 use std::f32::consts::TAU;
 
 use common::{model, numbers};
+use veni_fit::{Encoded, Encoder};
 use veni_light::model::{EncoderConfig, Pooling, Reduction, VectorLayer, VnReluForm};
 use veni_light::sphere::{Equirect, StripeSampling};
-use veni_fit::{Encoded, Encoder};
 
 const STRIPES: usize = 8;
 const SAMPLES: usize = 16;

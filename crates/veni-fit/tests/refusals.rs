@@ -6,9 +6,9 @@ mod common;
 use std::collections::BTreeMap;
 
 use common::{config, model, tensors};
-use veni_light::model::{EncoderConfig, Model, ModelConfig, ModelInfo, Reduction, Array, VectorLayer};
-use veni_light::sphere::Equirect;
 use veni_fit::Encoder;
+use veni_light::model::{Array, EncoderConfig, Model, ModelConfig, ModelInfo, Reduction, VectorLayer};
+use veni_light::sphere::Equirect;
 
 fn small() -> EncoderConfig {
     EncoderConfig {

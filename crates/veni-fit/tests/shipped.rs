@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use veni_light::model::Model;
-use veni_image::Panorama;
-use veni_light::sphere::Equirect;
 use veni_fit::Encoder;
+use veni_image::Panorama;
+use veni_light::model::Model;
+use veni_light::sphere::Equirect;
 
 /// What burn's flex device gives for `mud_road_puresky.exr` and the model of latent dimension 27.
 #[allow(clippy::excessive_precision, reason = "as it was written")]
@@ -27,7 +27,8 @@ const LOG_EXPOSURE: f32 = -1.1022649;
 #[test]
 fn the_latent_is_that_of_the_trained_network() {
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets");
-    let model = Model::load(assets.join("../crates/veni-light/assets/veni-27.safetensors")).expect("the shipped model");
+    let model = Model::load(assets.join("../crates/veni-light/assets/veni-27.safetensors"))
+        .expect("the shipped model");
     let panorama = Panorama::read(assets.join("panoramas/val/mud_road_puresky.exr")).expect("a panorama");
     let grid = Equirect::new(128, 64);
     let mut log_radiance = panorama.resample(grid).log().into_flattened();

@@ -6,15 +6,15 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::time::Duration;
-use veni_light::latent::{Latent, Prior};
-use veni_light::model::{Model, ModelConfig};
-use veni_light::sphere::Equirect;
 use veni_gpu::adapters::{self, Opened};
 use veni_gpu::wgpu::{
     CommandEncoderDescriptor, Extent3d, PollType, TextureDescriptor, TextureDimension, TextureFormat,
     TextureUsages,
 };
 use veni_gpu::{Bake, GpuDecoder};
+use veni_light::latent::{Latent, Prior};
+use veni_light::model::{Model, ModelConfig};
+use veni_light::sphere::Equirect;
 
 const SIZES: [[u32; 2]; 4] = [[128, 64], [1024, 512], [2048, 1024], [4096, 2048]];
 

@@ -17,12 +17,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use veni_gpu::wgpu::{self, BufferUsages, TextureUsages};
+use veni_gpu::{Bake, GpuDecoder, read_back};
 use veni_light::field::Field;
 use veni_light::latent::Latent;
 use veni_light::model::Model;
 use veni_light::sphere::Frame;
-use veni_gpu::wgpu::{self, BufferUsages, TextureUsages};
-use veni_gpu::{Bake, GpuDecoder, read_back};
 
 type Result<T, E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
@@ -266,7 +266,9 @@ fn arguments() -> Result<(PathBuf, u64)> {
         match name.as_str() {
             "--model" => model = value.into(),
             "--seed" => seed = value.parse().map_err(|_| format!("--seed {value}: not a whole number"))?,
-            _ => return Err(format!("unknown argument {name}; 5_own_device [--seed S] [--model FILE]").into()),
+            _ => {
+                return Err(format!("unknown argument {name}; 5_own_device [--seed S] [--model FILE]").into());
+            }
         }
     }
     Ok((model, seed))

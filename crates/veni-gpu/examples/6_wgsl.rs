@@ -13,8 +13,8 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use veni_light::model::Model;
 use veni_gpu::shader::{self, Directions, ENTRY_POINT, Kernel, Sizes, Store, Variant, Weights};
+use veni_light::model::Model;
 
 /// Workgroup memory that every WebGPU device has, bytes.
 const WORKGROUP_MEMORY: u32 = 16 << 10;

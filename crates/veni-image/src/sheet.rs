@@ -36,7 +36,13 @@ impl Sheet {
 
     /// The same with so many pixels between cells, and this colour there.
     #[must_use]
-    pub fn spaced(columns: usize, rows: usize, [width, height]: [usize; 2], gap: usize, colour: [u8; 3]) -> Self {
+    pub fn spaced(
+        columns: usize,
+        rows: usize,
+        [width, height]: [usize; 2],
+        gap: usize,
+        colour: [u8; 3],
+    ) -> Self {
         let side = |cells: usize, size: usize| cells * (size + gap) + gap;
         let cell = [width, height];
         let (width, height) = (side(columns, width), side(rows, height));
@@ -70,7 +76,12 @@ impl Sheet {
 /// # Errors
 /// [`Error::Exists`] if `path` exists and may not be replaced, [`Error::Io`] if it cannot be written, [`Error::Invalid`] if there
 /// are not W·H pixels or a side is 0 or too long for PNG.
-pub fn write_png(path: &Path, [width, height]: [usize; 2], pixels: &[[u8; 3]], overwrite: Overwrite) -> Result<()> {
+pub fn write_png(
+    path: &Path,
+    [width, height]: [usize; 2],
+    pixels: &[[u8; 3]],
+    overwrite: Overwrite,
+) -> Result<()> {
     let broken = |e: png::EncodingError| match e {
         png::EncodingError::IoError(e) => Error::io(path, "write", e),
         other => Error::invalid(format!("{}: PNG: {other}", path.display())),
@@ -80,7 +91,8 @@ pub fn write_png(path: &Path, [width, height]: [usize; 2], pixels: &[[u8; 3]], o
         return Err(Error::invalid(format!("{}: {count} pixels for {width} × {height}", path.display())));
     }
     let side = |n: usize| {
-        u32::try_from(n).map_err(|_| Error::invalid(format!("{}: {n} is too long a side for PNG", path.display())))
+        u32::try_from(n)
+            .map_err(|_| Error::invalid(format!("{}: {n} is too long a side for PNG", path.display())))
     };
     let (width, height) = (side(width)?, side(height)?);
     write_atomic(path, overwrite, |file| {

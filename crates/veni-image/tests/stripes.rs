@@ -45,10 +45,7 @@ fn samples_agree_with_their_directions() {
             }
         }
         // within bilinear error for the exact grid; half a pixel at the unwrapped seam for the other
-        assert!(
-            worst < if sampling == StripeSampling::Exact { 4e-3 } else { 3e-2 },
-            "{sampling:?}: {worst}"
-        );
+        assert!(worst < if sampling == StripeSampling::Exact { 4e-3 } else { 3e-2 }, "{sampling:?}: {worst}");
     }
 }
 
@@ -81,8 +78,7 @@ fn rolling_by_whole_stripes_permutes_bit_for_bit() {
             let rolled = image.turn(2.0 * PI * k as f64 / t as f64);
             let other = stripes.sample(rolled.pixels(), image.grid());
             // turned by k stripes: what stripe p saw is now seen by stripe p + k
-            let expected: Vec<_> =
-                (0..t).flat_map(|q| seen[(q + t - k) % t * p..][..p].to_vec()).collect();
+            let expected: Vec<_> = (0..t).flat_map(|q| seen[(q + t - k) % t * p..][..p].to_vec()).collect();
             assert!(other == expected, "width {width}, {k} stripes");
         }
     }

@@ -239,7 +239,8 @@ mod tests {
         let cloud = Cloud::new(&CloudLayer { seed, ..layer(kind, cover) });
         let (mut above, mut cloudy) = (0, 0);
         for k in 0..SIDE * SIDE {
-            let p = Vec2::new((k % SIDE) as f32, (k / SIDE) as f32) * (20.0 / SIDE as f32 * cloud.layer.scale);
+            let p =
+                Vec2::new((k % SIDE) as f32, (k / SIDE) as f32) * (20.0 / SIDE as f32 * cloud.layer.scale);
             above += usize::from(cloud.field(p, 0.0) > cloud.threshold);
             cloudy +=
                 usize::from((1..8).any(|level| cloud.density(p, level as f32 / 8.0, 0.0, true).0 > 0.0));

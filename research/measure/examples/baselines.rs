@@ -9,12 +9,12 @@ use std::path::Path;
 use std::time::Instant;
 
 use rayon::prelude::*;
-use veni_eval::baseline::{Baseline, Kind, Space};
+use veni_core::data::Reconstruction;
 use veni_core::data::{Dataset, panorama_files};
 use veni_core::panorama::metrics::Alignment;
-use veni_core::data::Reconstruction;
 use veni_core::sphere::Equirect;
 use veni_core::{Error, Result};
+use veni_eval::baseline::{Baseline, Kind, Space};
 
 const SYSTEMS: [(&str, Kind, Space); 5] = [
     ("spherical harmonics, log", Kind::SphericalHarmonics, Space::Log),

@@ -6,10 +6,10 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use clap::{ArgGroup, Args, ValueEnum};
 use serde_json::json;
-use veni_light::latent::Latent;
-use veni_light::output::Overwrite;
 use veni_image::tonemap::{Curve, Tonemap};
 use veni_image::{Precision, WriteFormat, WriteOptions};
+use veni_light::latent::Latent;
+use veni_light::output::Overwrite;
 
 use crate::args::{Decoding, Force};
 use crate::device::Device;

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 use serde_json::json;
-use veni_light::output::Overwrite;
 use veni_image::Panorama;
-use veni_image::tonemap::Tonemap;
-use veni_light::sphere::Equirect;
 use veni_image::Sheet;
+use veni_image::tonemap::Tonemap;
+use veni_light::output::Overwrite;
+use veni_light::sphere::Equirect;
 
 use crate::args::{Force, ModelArgs};
 use crate::latent_files::LatentFiles;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use veni_light::Error;
+use veni_core::train::config::DeviceKind;
 use veni_data::{Dataset, Fold};
 use veni_eval::codec::Codec;
 use veni_eval::lpips::{self, Lpips};
@@ -17,9 +17,9 @@ use veni_eval::protocol::{
 };
 use veni_eval::store::Store;
 use veni_eval::table::{Format, Table};
+use veni_light::Error;
 use veni_light::output::{Overwrite, write_atomic};
 use veni_light::sphere::Equirect;
-use veni_core::train::config::DeviceKind;
 
 use crate::output::with_remedy;
 use crate::part::fold;

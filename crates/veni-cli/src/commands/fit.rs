@@ -12,9 +12,9 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
-use veni_image::metrics::{Alignment, Scores, scores};
 use veni_fit::{Best, FitConfig, Observation, best_light, random_starts};
 use veni_image::Picture;
+use veni_image::metrics::{Alignment, Scores, scores};
 use veni_light::latent::Latent;
 use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
@@ -285,9 +285,7 @@ impl Fit {
             Start::Encoder if !has_encoder => {
                 bail!("{}: this model has no encoder: use --start zero or noise", model.name())
             }
-            Start::Encoder => {
-                model.encode(observation.grid, &observation.log_radiance)?
-            }
+            Start::Encoder => model.encode(observation.grid, &observation.log_radiance)?,
         };
         let rest = count - usize::from(first.is_some());
         let random = random_starts(&model.prior(), 0.0, rest, self.settings.seed());

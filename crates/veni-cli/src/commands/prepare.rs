@@ -14,8 +14,8 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use veni_image::ReadOptions;
 use veni_data::prepare::{PrepareConfig, Shares};
+use veni_image::ReadOptions;
 use veni_light::sphere::Equirect;
 
 use crate::args::Force;

@@ -10,10 +10,10 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use clap::{ArgGroup, Args};
 use serde_json::json;
-use veni_light::output::Overwrite;
+use veni_fit::shade::{Camera, Colour, Lights, Material, ShadingForm, Surface, Transfer};
 use veni_image::tonemap::{Curve, REFERENCE_QUANTILE, Tonemap, quantile};
 use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
-use veni_fit::shade::{Camera, Colour, Lights, Material, ShadingForm, Surface, Transfer};
+use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
 
 use crate::args::{Force, ModelArgs};

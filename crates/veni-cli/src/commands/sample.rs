@@ -6,12 +6,12 @@ use std::str::FromStr;
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
+use veni_image::Panorama;
+use veni_image::Sheet;
+use veni_image::tonemap::Tonemap;
 use veni_light::Error;
 use veni_light::output::Overwrite;
-use veni_image::Panorama;
-use veni_image::tonemap::Tonemap;
 use veni_light::sphere::Equirect;
-use veni_image::Sheet;
 
 use crate::args::{Decoding, Force};
 use crate::device::Device;

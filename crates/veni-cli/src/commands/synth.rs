@@ -10,11 +10,11 @@ use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde_json::json;
-use veni_light::output::Overwrite;
+use veni_image::Sheet;
 use veni_image::tonemap::Tonemap;
 use veni_image::{Panorama, Precision};
+use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
-use veni_image::Sheet;
 use veni_synth::{Overrides, Place, Scene, SkyKind, generate};
 
 use crate::args::Force;

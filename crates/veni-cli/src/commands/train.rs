@@ -13,11 +13,11 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
 use serde_json::json;
-use veni_light::Error;
-use veni_light::model::ModelKind;
 use veni_core::train::config::TrainConfig;
 use veni_core::train::init::Initialised;
 use veni_core::train::run::{Finish, Trainer};
+use veni_light::Error;
+use veni_light::model::ModelKind;
 
 use crate::commands::inspect::run::{self, Best};
 use crate::output::with_remedy;

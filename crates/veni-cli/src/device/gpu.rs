@@ -4,14 +4,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
-use veni_light::latent::Latent;
-use veni_light::model::Model;
-use veni_light::sphere::Frame;
 use veni_gpu::adapters::{self, Found, Opened};
 use veni_gpu::read_back::{self, Picture};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::AdapterInfo;
 use veni_gpu::{GpuDecoder, GpuLatents};
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_light::sphere::Frame;
 
 use super::directions::Directions;
 use crate::args::DecodeDevice;

@@ -1,8 +1,8 @@
 //! Progress as the library reports it.
 
+use veni_core::train::progress::{Progress, StepReport, ValidationReport};
 use veni_eval::protocol::Observer;
 use veni_image::metrics::MeanScores;
-use veni_core::train::progress::{Progress, StepReport, ValidationReport};
 
 use super::Bars;
 

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use veni_data::Item;
+use veni_fit::Encoder;
+use veni_image::Panorama;
 use veni_image::metrics::{Alignment, Scores, scores};
 use veni_light::field::Field;
 use veni_light::latent::Latent;
-use veni_image::Panorama;
 use veni_light::sphere::Equirect;
-use veni_fit::Encoder;
 
 use super::image::panorama;
 use super::model::Loaded;

@@ -2,13 +2,13 @@
 //! as objectives over whole images.
 
 mod graph;
-mod whole_loss;
 #[cfg(test)]
 mod tests;
+mod whole_loss;
 
 pub use veni_fit::{
-    Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective, Observation,
-    PanoramaLoss, Plateau, from_each, loss, matching_exposure, random_starts, schedule, shade,
+    Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective,
+    Observation, PanoramaLoss, Plateau, from_each, loss, matching_exposure, random_starts, schedule, shade,
 };
 
 use burn::tensor::Device;
@@ -108,7 +108,9 @@ pub fn best_of<'a>(
 ) -> Result<Best> {
     assert!(target.count() == 1, "one image");
     let decoder = decoder.into();
-    from_each(starts, config, observer, |start, observer| fit_observed(decoder, target, start, config, observer))
+    from_each(starts, config, observer, |start, observer| {
+        fit_observed(decoder, target, start, config, observer)
+    })
 }
 
 /// [`veni_fit::best_light`] for either kind of decoder.

@@ -2,9 +2,9 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 
-use veni_fit::{FitConfig, FitTarget, Objective, PanoramaLoss};
 use crate::train::loss::{Loss, LossConfig, LossForm, cosine, mse, scale_invariant};
 use crate::{Error, Result};
+use veni_fit::{FitConfig, FitTarget, Objective, PanoramaLoss};
 
 /// The images and the loss, ready on a device.
 #[derive(Debug)]
@@ -88,7 +88,9 @@ impl PanoramaLoss for WholeLoss {
         let prediction = self.tensor(log_radiance).require_grad();
         let value = self.between(prediction.clone(), self.target.clone());
         let gradients = value.clone().backward();
-        let gradient = prediction.grad(&gradients).ok_or_else(|| Error::invalid("the loss does not depend on the image"))?;
+        let gradient = prediction
+            .grad(&gradients)
+            .ok_or_else(|| Error::invalid("the loss does not depend on the image"))?;
         let gradient = gradient.into_data().convert::<f64>().try_into_vec().expect("just converted to f64");
         Ok((f64::from(value.into_scalar::<f32>()), gradient))
     }

@@ -10,10 +10,10 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use veni_light::output::{Overwrite, write_atomic};
 use crate::vae::weights::Weights;
-use veni_light::model::Array;
 use crate::{Error, Result};
+use veni_light::model::Array;
+use veni_light::output::{Overwrite, write_atomic};
 
 const KEY: &str = "veni-checkpoint";
 const FORMAT: u32 = 1;

@@ -7,16 +7,16 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
-use veni_data::{Dataset, Item};
-use veni_image::Panorama;
-use veni_light::sphere::Equirect;
 use crate::train::config::{DecoderBackend, DeviceKind, TrainConfig};
 use crate::train::network::{Network, Prepared};
 use crate::train::presets::Preset;
 use crate::train::replicas::Replicas;
-use veni_fit::schedule::WeightSchedule;
 use crate::train::step;
 use crate::vae::weights::{self, Weights};
+use veni_data::{Dataset, Item};
+use veni_fit::schedule::WeightSchedule;
+use veni_image::Panorama;
+use veni_light::sphere::Equirect;
 
 /// All but the cuda device, which needs a card.
 fn devices() -> Vec<DeviceKind> {

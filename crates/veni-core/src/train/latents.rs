@@ -6,12 +6,12 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};
 
-use veni_data::Dataset;
 use crate::fit::FitConfig;
-use veni_light::output::{Overwrite, write_atomic};
 use crate::train::config::GroupConfig;
 use crate::vae::LatentTable;
 use crate::{Error, Result};
+use veni_data::Dataset;
+use veni_light::output::{Overwrite, write_atomic};
 
 /// An auto-decoder's latents: their optimiser, the rays of a step, and how a panorama without a latent gets one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use veni_light::output::{Overwrite, write_atomic};
 use crate::{Error, Result};
+use veni_light::output::{Overwrite, write_atomic};
 
 /// An append-only log of records that have a `step`.
 #[derive(Debug)]

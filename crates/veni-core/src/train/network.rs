@@ -3,9 +3,6 @@
 use burn::module::Module;
 use burn::tensor::{Device, Gradients, Tensor};
 
-use veni_data::Dataset;
-use veni_light::random::{Purpose, stream};
-use veni_light::model::ModelKind;
 use crate::train::batch::{Batch, Batches};
 use crate::train::config::{DecoderBackend, TrainConfig};
 use crate::train::loss::{Loss, LossTerms};
@@ -14,6 +11,9 @@ use crate::train::rays::{RayBatch, RayBatches};
 use crate::train::step::{batch_loss, tensor};
 use crate::vae::{Decoder, Reni, Veni};
 use crate::{Error, Result};
+use veni_data::Dataset;
+use veni_light::model::ModelKind;
+use veni_light::random::{Purpose, stream};
 
 /// The network. Parameter paths are those of the system: `decoder.*` and `encoder.*`, or `decoder.*` and `latents.*`.
 #[derive(Module, Debug)]

@@ -18,8 +18,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::vae::weights::{self, Weights};
-use veni_light::model::Array;
 use crate::{Error, Result};
+use veni_light::model::Array;
 
 /// Adam's constants for one group.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -20,7 +20,6 @@ use std::time::Instant;
 use burn::module::Module;
 use serde::Serialize;
 
-use veni_data::{Dataset, Splits};
 use crate::train::checkpoint::{self, Best, CheckpointInfo};
 use crate::train::config::{Stage, TrainConfig};
 use crate::train::init::Initialised;
@@ -31,6 +30,7 @@ use crate::train::progress::{Progress, StepReport, ValidationReport};
 use crate::train::replicas::{Computed, Replicas};
 use crate::vae::weights;
 use crate::{Error, Result};
+use veni_data::{Dataset, Splits};
 
 mod begin;
 mod results;

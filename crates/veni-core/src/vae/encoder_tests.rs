@@ -1,9 +1,9 @@
 //! Equivariance, options and gradients of the encoder.
 
 use super::*;
-use veni_light::model::VnReluForm;
 use crate::nn::testing::{assert_gradients, features, rng};
 use burn::tensor::TensorData;
+use veni_light::model::VnReluForm;
 
 const STRIPES: usize = 8;
 const SAMPLES: usize = 16;

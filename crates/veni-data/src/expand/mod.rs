@@ -86,7 +86,11 @@ pub trait Expand {
     /// # Errors
     /// Those of the network; [`Error::Invalid`](crate::Error::Invalid) if it is made for another size than the options
     /// name, or gives values that are not a radiance.
-    fn expand_by(&self, network: &dyn network::Network, options: &network::NetworkOptions) -> Result<network::NetworkExpanded>;
+    fn expand_by(
+        &self,
+        network: &dyn network::Network,
+        options: &network::NetworkOptions,
+    ) -> Result<network::NetworkExpanded>;
 }
 
 impl Expand for LdrPanorama {
@@ -96,7 +100,11 @@ impl Expand for LdrPanorama {
         Expanded { panorama, clipped: analysis.clipped(), regions: analysis.regions().len(), sun }
     }
 
-    fn expand_by(&self, network: &dyn network::Network, options: &network::NetworkOptions) -> Result<network::NetworkExpanded> {
+    fn expand_by(
+        &self,
+        network: &dyn network::Network,
+        options: &network::NetworkOptions,
+    ) -> Result<network::NetworkExpanded> {
         network::expand_by(self, network, options)
     }
 }

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use super::Fingerprint;
 use crate::expand::network::{Estimate, Network, NetworkOptions};
 use crate::expand::{Expand, ExpandOptions, Sun};
+use crate::{Error, Result};
 use veni_image::tonemap::quantile;
 use veni_image::{LdrPanorama, Panorama, ReadOptions, Sanitised, luminance};
 use veni_light::sphere::Equirect;
-use crate::{Error, Result};
 
 /// More pixels than this that are not numbers, and a file counts as broken.
 const BROKEN: f64 = 0.05;

@@ -4,8 +4,8 @@ use super::fitted::{Field, Fitted};
 use super::gaussians::{Gaussians, Search};
 use super::harmonics::Harmonics;
 use super::target::{Space, Target};
-use veni_light::sphere::Equirect;
 use crate::{Error, Result};
+use veni_light::sphere::Equirect;
 
 /// A family of systems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

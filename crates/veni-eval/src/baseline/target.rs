@@ -1,7 +1,7 @@
 //! What a baseline is fitted to.
 
-use veni_light::sphere::Equirect;
 use crate::{Error, Result};
+use veni_light::sphere::Equirect;
 
 /// The quantity that a baseline expands, and in which its squared error is least.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -4,8 +4,8 @@ use serde_json::{Value, json};
 
 use super::Codec;
 use crate::baseline::{Baseline, Fitted, Kind, Space};
-use veni_light::sphere::Equirect;
 use crate::{Error, Result};
+use veni_light::sphere::Equirect;
 
 /// A basis fitted to each image.
 #[derive(Clone, Debug)]

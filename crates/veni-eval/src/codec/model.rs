@@ -4,11 +4,11 @@ use serde_json::{Value, json};
 
 use super::Codec;
 use crate::fitting::FitSettings;
-use veni_image::metrics::{Alignment, scores};
+use crate::{Error, Result};
 use veni_core::LoadedModel;
+use veni_image::metrics::{Alignment, scores};
 use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
-use crate::{Error, Result};
 
 /// Where the optimisation of a latent starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,12 +3,12 @@
 use std::convert::Infallible;
 use std::path::Path;
 
+use crate::{Error, Result};
 use embedded_graphics::mono_font::{MonoTextStyle, iso_8859_1::FONT_6X10};
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, Point, RgbColor, Size};
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
 use veni_light::output::Overwrite;
-use crate::{Error, Result};
 
 /// Width and height of a letter, pixels.
 pub(super) const LETTER: [i32; 2] = [6, 10];

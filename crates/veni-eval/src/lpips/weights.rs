@@ -7,9 +7,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::{Error, Result};
 use veni_core::import::Checkpoint;
 use veni_light::model::Array;
-use crate::{Error, Result};
 
 /// A convolution of AlexNet's feature extractor.
 #[derive(Clone, Copy, Debug)]

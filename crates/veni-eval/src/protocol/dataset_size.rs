@@ -6,9 +6,9 @@
 use super::quality::{self, reconstruct};
 use super::{Evaluation, Report, Share, reconstruction};
 use crate::figure::{Axis, Plot, Series};
-use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
+use veni_core::LoadedModel;
 
 /// Table: reconstruction per number of training panoramas; LDR PSNR (exposure) as curves.
 ///

@@ -12,12 +12,12 @@ use burn::tensor::{Tensor, TensorData};
 
 use super::{Evaluation, Report};
 use crate::Result;
-use veni_data::augment::{mirror, turn_columns};
 use crate::figure::{Axis, Plot, Series};
-use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
-use veni_light::latent::{Latent, Prior};
+use veni_core::LoadedModel;
+use veni_data::augment::{mirror, turn_columns};
 use veni_data::parallel::parallel;
+use veni_light::latent::{Latent, Prior};
 use veni_light::sphere::Equirect;
 
 /// Latents that stand for all where there is no encoder to give some.

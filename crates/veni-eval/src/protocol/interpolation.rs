@@ -10,11 +10,11 @@ use super::{Evaluation, Report, Share};
 use crate::codec::{Autoencoder, Codec, Optimised, model::latent};
 use crate::figure::{Axis, Plot, Series, Sheet, display};
 use crate::fitting::FitSettings;
-use veni_image::metrics::log_error;
-use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
-use veni_light::latent::Latent;
 use crate::{Error, Result};
+use veni_core::LoadedModel;
+use veni_image::metrics::log_error;
+use veni_light::latent::Latent;
 
 /// The way between two panoramas.
 struct Way {

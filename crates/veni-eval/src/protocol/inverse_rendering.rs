@@ -11,21 +11,21 @@ use serde_json::json;
 use super::quality::{self, Quality, rate};
 use super::work::{Work, images};
 use super::{Evaluation, Report, Share};
-use veni_data::Item;
 use crate::figure::{Axis, Plot, Series, Sheet, display};
-use veni_image::metrics::{Alignment, psnr};
 use crate::store::Key;
-use veni_core::LoadedModel;
 use crate::table::{Cell, Table};
+use crate::{Error, Result};
+use veni_core::LoadedModel;
 use veni_core::fit::{FitConfig, FitResult, fit_shaded, matching_exposure};
-use veni_light::latent::Latent;
-use veni_image::Panorama;
+use veni_data::Item;
 use veni_fit::shade::{
     Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedImage, ShadedLoss, ShadingForm, Surface,
     Transfer,
 };
+use veni_image::Panorama;
+use veni_image::metrics::{Alignment, psnr};
+use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
-use crate::{Error, Result};
 
 /// Exponent of the highlight: the authors'.
 const SHININESS: f32 = 500.0;

@@ -41,9 +41,9 @@ use super::figure::{Plot, Sheet};
 use super::fitting::FitSettings;
 use super::lpips::Lpips;
 use super::store::Store;
-use veni_core::LoadedModel;
 use super::table::Table;
 use crate::Result;
+use veni_core::LoadedModel;
 use veni_data::Dataset;
 
 /// What can be chosen about the protocols.

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use veni_core::LoadedModel;
 use crate::table::{Cell, Column, Table};
-use veni_light::model::ModelKind;
 use crate::{Error, Result};
+use veni_core::LoadedModel;
+use veni_light::model::ModelKind;
 
 /// LDR PSNR of VENI's reconstructions by D, autoencoder pass and optimised (arXiv 2601.14079).
 const VENI_LDR_PSNR: [(usize, [f64; 2]); 3] =

@@ -9,14 +9,14 @@ use serde_json::json;
 use super::Evaluation;
 use super::work::{Work, images};
 use crate::Result;
-use veni_data::Item;
 use crate::codec::Codec;
 use crate::lpips::Lpips;
-use veni_image::metrics::{Alignment, scores, sun_error};
 use crate::store::Key;
 use crate::table::Cell;
-use veni_image::tonemap::srgb_q98;
+use veni_data::Item;
 use veni_data::parallel::parallel;
+use veni_image::metrics::{Alignment, scores, sun_error};
+use veni_image::tonemap::srgb_q98;
 use veni_light::sphere::Equirect;
 
 /// Titles of the columns of [`Quality::cells`].

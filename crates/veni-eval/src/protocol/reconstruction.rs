@@ -6,10 +6,10 @@
 use super::quality::{self, Reconstructed, coding, reconstruct};
 use super::{Evaluation, Report, Share};
 use crate::Result;
-use veni_data::Item;
 use crate::codec::Codec;
 use crate::figure::{HEAT_RANGE, Sheet, display, heat};
 use crate::table::{Cell, Table};
+use veni_data::Item;
 
 /// Table 1: means per codec; table 2: every panorama; a sheet per system: target, reconstructions, their errors; and of several
 /// systems a sheet with the last pass of each side by side.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use veni_light::model::{EncoderConfig, Model, ModelConfig, Pooling, Reduction, Array, VectorLayer};
+use veni_light::model::{Array, EncoderConfig, Model, ModelConfig, Pooling, Reduction, VectorLayer};
 use veni_light::{Error, Result};
 
 /// x, y, z and the colours r, g, b of one sample.

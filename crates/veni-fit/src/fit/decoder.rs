@@ -116,7 +116,9 @@ impl DecoderPasses for FoldedPasses<'_> {
         let fields = self.fields(latents)?;
         let by_radiance = gradient(&self.decoded(&fields))?;
         let mut out = LatentGradient::default();
-        for (field, by) in fields.iter().zip(by_radiance.as_chunks::<3>().0.chunks_exact(self.directions.len())) {
+        for (field, by) in
+            fields.iter().zip(by_radiance.as_chunks::<3>().0.chunks_exact(self.directions.len()))
+        {
             out.push(field.gradient(&self.directions, |i, _| (0.0, by[i].map(|v| v as f32))));
         }
         Ok(out)

@@ -2,9 +2,9 @@
 
 use super::{FitConfig, FitResult, FitTarget, LatentDecoder, fit_shaded, fit_with};
 use crate::Result;
-use veni_light::random::{Purpose, stream};
-use veni_light::latent::{Latent, Prior};
 use crate::shade::ShadedImage;
+use veni_light::latent::{Latent, Prior};
+use veni_light::random::{Purpose, stream};
 
 /// The best of several fits of one image.
 #[derive(Clone, Debug, PartialEq)]

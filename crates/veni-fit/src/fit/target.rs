@@ -58,7 +58,10 @@ impl<'a> FitTarget<'a> {
             return Err(Error::invalid("0 images to fit"));
         }
         if let Some(wrong) = images.iter().find(|image| image.len() != 3 * pixels) {
-            return Err(Error::invalid(format!("an image has {} values, its grid {pixels} pixels", wrong.len())));
+            return Err(Error::invalid(format!(
+                "an image has {} values, its grid {pixels} pixels",
+                wrong.len()
+            )));
         }
         let image = |log_radiance: &&'a [f32]| TargetImage { log_radiance, mask: None, clipped: None };
         Ok(Self { grid, view: None, images: images.iter().map(image).collect(), prior: None })
@@ -188,7 +191,8 @@ impl<'a> FitTarget<'a> {
     pub(super) fn check_finite(&self) -> Result<()> {
         for (b, TargetImage { log_radiance, mask, .. }) in self.images.iter().enumerate() {
             let counts = |p: usize| mask.is_none_or(|mask| mask[p] > 0.0);
-            if let Some(k) = (0..log_radiance.len()).find(|k| !log_radiance[*k].is_finite() && counts(k / 3)) {
+            if let Some(k) = (0..log_radiance.len()).find(|k| !log_radiance[*k].is_finite() && counts(k / 3))
+            {
                 return Err(Error::invalid(format!(
                     "image {b}, pixel {} is {} in log radiance; mask it or sanitise the image",
                     k / 3,

@@ -60,8 +60,7 @@ fn a_photograph_sees_what_the_panorama_has_there() {
     let light = |[x, y, z]: [f32; 3]| [2.0 + x, 2.0 + y, 2.0 + z];
     let (directions, _) = view.pixels(90, 60);
     let pixels: Vec<_> = directions.into_iter().map(light).collect();
-    let seen =
-        Observation::photograph(&whole(&pixels, [90, 60]).clipped_at(2.9), &view, 45).unwrap();
+    let seen = Observation::photograph(&whole(&pixels, [90, 60]).clipped_at(2.9), &view, 45).unwrap();
     assert_eq!((seen.grid.width, seen.grid.height), (45, 30));
     let (directions, areas) = seen.view.as_ref().unwrap();
     let covered = areas.iter().sum::<f32>() / (4.0 * PI as f32);

@@ -2,8 +2,8 @@
 
 use super::icosahedron;
 use super::vector::unit_f32;
-use veni_light::sphere::{Equirect, reference};
 use crate::{Error, Result};
+use veni_light::sphere::{Equirect, reference};
 
 /// Distant lights: L directions towards them, each with the solid angle ω that it stands for.
 #[derive(Clone, Debug, PartialEq)]

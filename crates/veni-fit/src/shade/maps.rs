@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::vector::{length, narrow, unit_f32, wide};
+use crate::{Error, Result};
 use veni_image::tonemap::srgb_to_linear;
 use veni_image::{LdrPanorama, Panorama, ReadOptions};
-use crate::{Error, Result};
 
 /// A normal counts if its length lies strictly between these (MODEL, Rendered images).
 const LENGTHS: [f64; 2] = [0.5, 1.5];
@@ -153,8 +153,8 @@ fn display(path: &Path) -> Result<Option<Rgba>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use veni_light::output::Overwrite;
     use veni_image::{Precision, WriteFormat, WriteOptions};
+    use veni_light::output::Overwrite;
     use veni_light::sphere::Equirect;
 
     #[test]

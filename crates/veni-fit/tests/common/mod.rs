@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use veni_light::model::{
-    DecoderConfig, EncoderConfig, Model, ModelConfig, ModelInfo, ModelKind, Array, decoder_schema,
-};
 use veni_fit::encoder::encoder_schema;
+use veni_light::model::{
+    Array, DecoderConfig, EncoderConfig, Model, ModelConfig, ModelInfo, ModelKind, decoder_schema,
+};
 
 /// The encoder's configuration beside the smallest decoder.
 pub(crate) fn config(encoder: EncoderConfig, latent_vectors: usize) -> ModelConfig {

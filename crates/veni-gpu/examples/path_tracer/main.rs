@@ -21,15 +21,15 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use veni_light::field::Field;
-use veni_light::latent::Latent;
-use veni_light::model::Model;
-use veni_image::{luminance, tonemap::srgb};
-use veni_light::sphere::Equirect;
 use veni_gpu::adapters::{self, Opened};
 use veni_gpu::shader::{self, Weights};
 use veni_gpu::wgpu::{self, BufferUsages};
 use veni_gpu::{GpuDecoder, GpuLatents, read_back};
+use veni_image::{luminance, tonemap::srgb};
+use veni_light::field::Field;
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_light::sphere::Equirect;
 
 type Result<T, E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 

@@ -1,11 +1,11 @@
 //! Targets: textures, rows, batches, ranges of values.
 
-use veni_light::latent::Latent;
-use veni_light::sphere::Equirect;
 use veni_gpu::read_back::{Picture, bake_rows};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::TextureFormat;
 use veni_gpu::{Bake, Error, GpuDecoder};
+use veni_light::latent::Latent;
+use veni_light::sphere::Equirect;
 
 use crate::util::{self, agrees, difference, filler, latent};
 

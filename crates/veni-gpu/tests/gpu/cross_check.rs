@@ -1,10 +1,10 @@
 //! The GPU against the CPU's field.
 
-use veni_light::model::Model;
-use veni_light::sphere::{CubeFace, Equirect, Frame};
 use veni_gpu::decoder::KernelChoice;
 use veni_gpu::shader::{Grid, Kernel, Weights};
 use veni_gpu::{Bake, GpuDecoder};
+use veni_light::model::Model;
+use veni_light::sphere::{CubeFace, Equirect, Frame};
 
 use crate::util::{self, agrees, difference, directions, filler, latent, say};
 

@@ -1,11 +1,11 @@
 //! What does not fit is refused by name, and the host's device goes on.
 
-use veni_light::latent::Latent;
-use veni_light::sphere::{Equirect, Frame};
 use veni_gpu::read_back::{self, Picture, bake_rows};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::{BufferUsages, TextureFormat, TextureUsages};
 use veni_gpu::{Bake, Error, GpuDecoder};
+use veni_light::latent::Latent;
+use veni_light::sphere::{Equirect, Frame};
 
 use crate::util::{self, agrees, difference, filler, latent};
 

@@ -1,15 +1,15 @@
 //! Kernels run by hand from `shader` alone, as a host of another API would: text, constants, bindings, packed buffers,
 //! requests and dispatches. Other tests change the text on the way.
 
-use veni_light::latent::Latent;
-use veni_light::model::Model;
-use veni_light::sphere::Frame;
 use veni_gpu::shader::twin::{Twin, listed, stored};
 use veni_gpu::shader::{
     Binding, Directions, ENTRY_POINT, Grid, Kernel, Request, Sizes, Store, Variant, Weights, pack_latent,
     pack_model,
 };
 use veni_gpu::wgpu::{self, BufferUsages};
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_light::sphere::Frame;
 
 use crate::util::{Gpu, agrees, difference, directions, filler, latent, plain};
 

@@ -1,8 +1,8 @@
 //! Stage by stage against the twin: where a cross-check of the whole network only says that something is wrong.
 
-use veni_light::sphere::Frame;
 use veni_gpu::shader::twin::{direction_of, listed, veni_encode};
 use veni_gpu::shader::{ENTRY_POINT, Grid, Kernel, Variant};
+use veni_light::sphere::Frame;
 
 use crate::kernels::{TILED, Work, list_variant};
 use crate::util::{directions, filler, latent, plain};

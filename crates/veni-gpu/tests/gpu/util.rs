@@ -4,8 +4,6 @@ use std::io::Write;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use veni_light::latent::{Latent, Prior};
-use veni_light::model::{DecoderConfig, Model, ModelConfig};
 use veni_gpu::adapters::{self, Opened};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::{
@@ -13,6 +11,8 @@ use veni_gpu::wgpu::{
     TextureDescriptor, TextureDimension, TextureFormat, TextureUsages,
 };
 use veni_gpu::{Bake, GpuDecoder, GpuLatents, read_back};
+use veni_light::latent::{Latent, Prior};
+use veni_light::model::{DecoderConfig, Model, ModelConfig};
 
 /// A device for one test, or nothing if tests on GPUs are to be skipped.
 pub(crate) struct Gpu {

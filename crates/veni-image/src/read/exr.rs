@@ -18,8 +18,8 @@ use rayon::prelude::*;
 
 use super::ReadOptions;
 use crate::colour::{Primaries, convert};
-use crate::{Panorama, RADIANCE_SCALE};
 use crate::{Error, Result};
+use crate::{Panorama, RADIANCE_SCALE};
 
 /// Compressed blocks held at a time while decompressing on all cores.
 const BATCH: usize = 32;

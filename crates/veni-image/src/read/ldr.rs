@@ -9,8 +9,8 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Li
 use super::{LDR, ReadOptions, first_bytes, open, stands, unknown};
 use crate::panorama::Panorama;
 use crate::tonemap::srgb_to_linear;
-use veni_light::sphere::Equirect;
 use crate::{Error, Result};
+use veni_light::sphere::Equirect;
 
 /// A panorama of limited dynamic range: display values in [0, 1], as an 8- or 16-bit file has them, row-major.
 /// They become radiance by [`LdrPanorama::linear`], or with what is clipped rebuilt by

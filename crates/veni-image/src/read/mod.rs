@@ -16,8 +16,8 @@ use std::path::Path;
 use image::ImageFormat;
 
 use crate::panorama::Panorama;
-use veni_light::sphere::Equirect;
 use crate::{Error, Result};
+use veni_light::sphere::Equirect;
 
 pub use ldr::{LdrPanorama, Transfer};
 

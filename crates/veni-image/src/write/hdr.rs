@@ -5,8 +5,8 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use super::{Accept, SOFTWARE, WriteOptions};
-use veni_light::sphere::Equirect;
 use crate::{Error, Result};
+use veni_light::sphere::Equirect;
 
 /// Row widths that the run-length code can express; others are stored flat.
 const RLE_WIDTHS: std::ops::RangeInclusive<usize> = 8..=0x7fff;

@@ -8,11 +8,11 @@ mod png;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::panorama::Panorama;
 use super::tonemap::Tonemap;
+use crate::panorama::Panorama;
+use crate::{Error, Result};
 use veni_light::output::{Overwrite, write_atomic};
 use veni_light::sphere::Equirect;
-use crate::{Error, Result};
 
 /// Name of the attribute in which an EXR file records the factor that its values were multiplied by to fit
 /// half precision; [`Panorama::read`] divides by it again.

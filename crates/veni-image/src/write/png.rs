@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::{Accept, SOFTWARE, WriteOptions};
 use crate::tonemap::Tonemap;
-use veni_light::sphere::Equirect;
 use crate::{Error, Result};
+use veni_light::sphere::Equirect;
 
 pub(super) fn write(
     file: &mut BufWriter<File>,

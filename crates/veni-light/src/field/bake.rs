@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::{Field, tasks};
 use super::aligned::Aligned;
 use super::block::Blocks;
 use super::single::Single;
+use super::{Field, tasks};
 use crate::sphere::Equirect;
 
 /// So many directions are faster one by one than as a block with idle lanes.

@@ -1,6 +1,6 @@
 //! Weights from a formula: for benches, tests and documentation that need a decoder but no asset.
 
-use super::{Conditioning, Model, ModelConfig, ModelInfo, Array, decoder_schema};
+use super::{Array, Conditioning, Model, ModelConfig, ModelInfo, decoder_schema};
 use crate::Result;
 
 impl Model {

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Model, Array};
+use super::{Array, Model};
 use crate::latent::Prior;
 use crate::{Error, Result};
 

@@ -3,7 +3,6 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow};
-use veni_light::sphere::Equirect;
 use veni_gpu::adapters::{Found, Opened};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::{
@@ -11,6 +10,7 @@ use veni_gpu::wgpu::{
     PollType, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages,
 };
 use veni_gpu::{Bake, GpuDecoder, GpuLatents, probe};
+use veni_light::sphere::Equirect;
 
 use super::cases::Case;
 use super::subject::{Bakes, Subject};

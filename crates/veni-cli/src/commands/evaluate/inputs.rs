@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
-use veni_light::Error;
-use veni_eval::baseline::Kind;
-use veni_data::{Fold, panorama_files};
-use veni_eval::codec::Basis;
 use veni_core::LoadedModel;
-use veni_light::output::{Overwrite, existing_above, write_atomic};
 use veni_core::train::config::DeviceKind;
+use veni_data::{Fold, panorama_files};
+use veni_eval::baseline::Kind;
+use veni_eval::codec::Basis;
+use veni_light::Error;
+use veni_light::output::{Overwrite, existing_above, write_atomic};
 
 use crate::args::ModelArgs;
 use crate::output::{with_remedy, writable};

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use anyhow::Result;
 use veni_fit::Best;
-use veni_light::latent::Latent;
-use veni_light::output::Overwrite;
 use veni_image::tonemap::Tonemap;
 use veni_image::{Panorama, Picture, Precision, WriteFormat, WriteOptions};
+use veni_light::latent::Latent;
+use veni_light::output::Overwrite;
 use veni_light::sphere::{Equirect, View};
 
 use super::model::FitModel;

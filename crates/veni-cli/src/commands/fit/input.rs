@@ -55,7 +55,10 @@ impl Input {
             let (size, mask) = read_mask(path).map_err(with_remedy)?;
             if size != picture.size() {
                 let [[w, h], [pw, ph]] = [size, picture.size()];
-                bail!("{}: the mask is {w} x {h}, the picture {pw} x {ph}: they must have one size", path.display());
+                bail!(
+                    "{}: the mask is {w} x {h}, the picture {pw} x {ph}: they must have one size",
+                    path.display()
+                );
             }
             picture = picture.masked(&mask)?;
         }

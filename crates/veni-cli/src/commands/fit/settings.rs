@@ -2,11 +2,11 @@
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+#[cfg(feature = "learn")]
+use veni_fit::loss::LossConfig;
 use veni_fit::schedule::LearningRate;
 use veni_fit::{FitConfig, Method, Objective, Plateau};
 use veni_light::sphere::Equirect;
-#[cfg(feature = "learn")]
-use veni_fit::loss::LossConfig;
 
 use crate::size::Size;
 

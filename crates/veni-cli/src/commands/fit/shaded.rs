@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use veni_fit::matching_exposure;
-use veni_image::Picture;
-use veni_light::latent::Latent;
 use veni_fit::shade::{
     Camera, Colour, ExposureForm, Lights, Material, NormalMap, ShadedImage, ShadedLoss, ShadingForm, Surface,
     Transfer, read_albedo, read_mask,
 };
+use veni_image::Picture;
+use veni_light::latent::Latent;
 use veni_light::sphere::{Equirect, View};
 
 use super::model::FitModel;

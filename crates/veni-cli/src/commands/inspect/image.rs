@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::{Result, anyhow};
 use serde_json::json;
-use veni_light::latent::Latent;
 use veni_image::{self, Panorama};
+use veni_light::latent::Latent;
 
 use super::facts::Facts;
 use super::latent;

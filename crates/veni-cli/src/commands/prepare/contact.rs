@@ -1,10 +1,10 @@
 //! `contact.png`: what is in the training set, at a glance.
 
 use anyhow::Result;
-use veni_light::output::Overwrite;
+use veni_data::prepare::Split;
 use veni_image::Panorama;
 use veni_image::tonemap::Tonemap;
-use veni_data::prepare::Split;
+use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
 
 use super::place::{Kept, Placed};

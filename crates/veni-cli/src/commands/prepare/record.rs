@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use veni_image::Sanitised;
 use veni_data::expand::network::Estimate;
 use veni_data::prepare::{Examined, Fingerprint, Split, capture};
+use veni_image::Sanitised;
 
 use super::network::NetworkSettings;
 use super::scan::Source;

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use anyhow::{Context, Result, bail};
-use veni_light::Error;
 use veni_data::prepare::Split;
+use veni_light::Error;
 use walkdir::WalkDir;
 
 /// Names that promise an image; whether it can be read is another question.

@@ -15,10 +15,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
+use veni_data::prepare::Expander;
+use veni_image::Transfer;
 use veni_light::Error;
 use veni_light::output::{Overwrite, write_atomic};
-use veni_image::Transfer;
-use veni_data::prepare::Expander;
 
 use super::network::NetworkSettings;
 use super::record::Record;

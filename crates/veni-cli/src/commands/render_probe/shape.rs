@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
-use veni_light::Error;
 use veni_fit::shade::{Camera, Mesh, REFERENCE_FIELD_OF_VIEW, Surface};
+use veni_light::Error;
 use veni_light::sphere::Frame;
 
 use crate::report::Report;

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
+use veni_image::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions, attributes};
 use veni_light::Error;
 use veni_light::output::Overwrite;
-use veni_image::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions, attributes};
 use veni_light::sphere::Equirect;
 use veni_synth::Scene;
 

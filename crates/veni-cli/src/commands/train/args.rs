@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use veni_data::Fold;
 use veni_core::train::config::{DeviceKind, Devices};
 use veni_core::train::presets::Preset;
+use veni_data::Fold;
 
 use crate::part::fold;
 

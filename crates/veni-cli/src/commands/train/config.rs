@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use veni_light::Error;
-use veni_light::model::ModelKind;
 use veni_core::train::config::{DecoderBackend, TrainConfig};
 use veni_core::train::init::InitConfig;
 use veni_core::train::presets::Preset;
+use veni_light::Error;
+use veni_light::model::ModelKind;
 
 use super::args::{PresetName, SystemName, Train};
 use crate::source;

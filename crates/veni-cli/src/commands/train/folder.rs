@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
+use veni_core::train::run::{is_free, leftovers};
 use veni_light::Error;
 use veni_light::output::existing_above;
-use veni_core::train::run::{is_free, leftovers};
 
 use super::args::Train;
 use crate::output::writable;

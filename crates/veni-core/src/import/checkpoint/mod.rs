@@ -21,8 +21,8 @@ use std::path::Path;
 use half::{bf16, f16};
 use safetensors::tensor::{Dtype, SafeTensors};
 
-use veni_light::model::Array;
 use crate::{Error, Result};
+use veni_light::model::Array;
 
 /// Largest file that is read: checkpoints with optimiser states are large, a wrong path must not fill the memory.
 const MAX_FILE_BYTES: u64 = 2 << 30;

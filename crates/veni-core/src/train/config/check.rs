@@ -1,9 +1,9 @@
 //! What types cannot say about a configuration.
 
 use super::{DecoderBackend, LossGrid, TrainConfig};
+use crate::{Error, Result};
 use veni_data::AugmentConfig;
 use veni_light::model::ModelKind;
-use crate::{Error, Result};
 
 impl TrainConfig {
     /// Checks what types cannot.

@@ -16,14 +16,14 @@ pub use loss_grid::LossGrid;
 pub use report::{ReportConfig, Stored};
 pub use stage::{Stage, StageConfig};
 
-use veni_data::{AugmentConfig, DataConfig};
-use veni_light::model::ModelConfig;
 use crate::train::init::InitConfig;
 use crate::train::latents::LatentsConfig;
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
-use veni_fit::schedule::LearningRate;
 use crate::{Error, Result};
+use veni_data::{AugmentConfig, DataConfig};
+use veni_fit::schedule::LearningRate;
+use veni_light::model::ModelConfig;
 
 /// A training run. Which system is trained is said by `model.kind`: the auto-encoder VENI, or the auto-decoder
 /// RENI++.

@@ -3,8 +3,8 @@
 use toml::{Table, Value};
 
 use super::TrainConfig;
-use veni_fit::schedule::LearningRate;
 use crate::{Error, Result};
+use veni_fit::schedule::LearningRate;
 
 impl TrainConfig {
     /// The configuration with dotted keys replaced: each override is `key.path=value`, the value in TOML

@@ -25,9 +25,9 @@ use toml::{Table, Value};
 
 use super::TrainConfig;
 use super::overrides::float_where_float;
+use crate::{Error, Result};
 use veni_data::PixelStorage;
 use veni_light::model::ModelKind;
-use crate::{Error, Result};
 
 /// What a stage may change: what neither the network, nor its state, nor the run's reports depend on.
 const CHANGEABLE: [&str; 10] =

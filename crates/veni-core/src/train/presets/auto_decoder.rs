@@ -2,14 +2,14 @@
 
 use super::Preset;
 use super::auto_encoder::group;
-use veni_data::AugmentConfig;
 use crate::fit::{FitConfig, Method};
-use veni_light::model::{ModelConfig, ModelKind};
 use crate::train::config::{LossGrid, Order, ReportConfig, TrainConfig};
 use crate::train::latents::LatentsConfig;
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
+use veni_data::AugmentConfig;
 use veni_fit::schedule::{LearningRate, Ramp, WeightSchedule};
+use veni_light::model::{ModelConfig, ModelKind};
 
 pub(super) fn preset(size: Preset, latent_vectors: usize) -> TrainConfig {
     let veni = size.config(latent_vectors);

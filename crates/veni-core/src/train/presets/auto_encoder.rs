@@ -1,13 +1,13 @@
 //! VENI in the three sizes.
 
-use veni_data::{AugmentConfig, DataConfig};
-use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 use crate::train::config::{
     DecoderBackend, DeviceKind, Devices, GroupConfig, LossGrid, Order, ReportConfig, Stored, TrainConfig,
 };
 use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
+use veni_data::{AugmentConfig, DataConfig};
 use veni_fit::schedule::{LearningRate, WeightSchedule};
+use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 
 /// Augmentation that keeps a sky a sky; chosen for a training set of some dozens.
 fn varied() -> AugmentConfig {

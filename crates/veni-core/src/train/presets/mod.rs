@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use toml::{Table, Value};
 
 use crate::train::config::{GroupConfig, StageConfig, TrainConfig};
-use veni_fit::schedule::LearningRate;
 use crate::{Error, Result};
+use veni_fit::schedule::LearningRate;
 
 mod auto_decoder;
 mod auto_encoder;

@@ -5,10 +5,10 @@ use std::fs;
 use std::io::Write;
 
 use super::*;
+use crate::train::init::{self, InitConfig};
 use veni_data::{PixelStorage, ProgressCallback};
 use veni_light::model::Model;
 use veni_light::output::{Overwrite, existing_above, write_atomic};
-use crate::train::init::{self, InitConfig};
 
 impl Trainer {
     /// Starts a run in `folder`, which must be free ([`is_free`]). `command` is recorded in the model file.

@@ -4,22 +4,22 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::*;
-use veni_data::DataConfig;
-use veni_data::coarsen::{averaged, coarse_grid};
-use veni_light::random::{Purpose, stream};
-use veni_image::metrics::Alignment;
-use veni_data::Reconstruction;
 use crate::fit::{FitTarget, fit};
-use veni_light::latent::{Latent, Prior};
-use veni_light::model::{Model, ModelInfo, Training};
-use veni_light::output::Overwrite;
-use veni_light::sphere::Equirect;
 use crate::train::batch::Batches;
 use crate::train::init::InitConfig;
 use crate::train::latents::{self, LatentsConfig};
 use crate::train::preview;
 use crate::vae::veni::decode;
 use crate::vae::{Decoder, LatentTable, Reni, Veni};
+use veni_data::DataConfig;
+use veni_data::Reconstruction;
+use veni_data::coarsen::{averaged, coarse_grid};
+use veni_image::metrics::Alignment;
+use veni_light::latent::{Latent, Prior};
+use veni_light::model::{Model, ModelInfo, Training};
+use veni_light::output::Overwrite;
+use veni_light::random::{Purpose, stream};
+use veni_light::sphere::Equirect;
 
 /// Panoramas in a preview.
 const PREVIEW_ROWS: usize = 8;

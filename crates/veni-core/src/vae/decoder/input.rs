@@ -1,8 +1,8 @@
 //! The directional input: products of latent and direction, encoded by sines. MODEL (16).
 
-use veni_light::model::Equivariance;
 use burn::tensor::{Tensor, TensorData};
 use std::f32::consts::TAU;
+use veni_light::model::Equivariance;
 
 /// Frequencies of the encoding.
 const FREQUENCIES: [f32; 2] = [1.0, 4.0];

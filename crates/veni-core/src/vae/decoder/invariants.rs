@@ -3,8 +3,8 @@
 
 use super::Condition;
 use super::input::encode;
-use veni_light::model::{DecoderConfig, Equivariance, Invariance};
 use burn::tensor::Tensor;
+use veni_light::model::{DecoderConfig, Equivariance, Invariance};
 
 /// All of it as one vector per image: latents [B, N, 3] → [B, C].
 ///

@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::{Decoder, Layers, invariants};
-use veni_light::field::training::{Bfloat16, Conditioned, Perceptron};
 use crate::{Error, Result};
+use veni_light::field::training::{Bfloat16, Conditioned, Perceptron};
 
 /// A decoder with the latents of a batch, on the processor.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! From the output map to log radiance. MODEL (20, 24).
 
-use veni_light::model::{DecoderConfig, OutputForm};
 use burn::tensor::Tensor;
+use veni_light::model::{DecoderConfig, OutputForm};
 
 /// Log radiance of the output map's y [B, R, 3].
 pub(super) fn log_radiance(config: &DecoderConfig, y: Tensor<3>) -> Tensor<3> {

@@ -2,9 +2,9 @@
 
 use super::super::CLIPPED;
 use super::{Estimate, KEPT, NetworkScale};
+use crate::{Error, Result};
 use veni_image::tonemap::quantile;
 use veni_image::{LdrPanorama, Panorama};
-use crate::{Error, Result};
 
 /// Linear values below this are noise of 8-bit coding, and tell no scale.
 const NOISE: f32 = 0.01;

@@ -32,9 +32,9 @@ mod tests;
 
 use std::fmt::Debug;
 
+use crate::{Error, Result};
 use veni_image::{LdrPanorama, Panorama, Transfer, tonemap};
 use veni_light::sphere::Equirect;
-use crate::{Error, Result};
 
 #[cfg(feature = "onnx")]
 pub use onnx::OnnxNetwork;
@@ -168,23 +168,25 @@ impl NetworkOptions {
 /// [`Expand::expand_by`](super::Expand::expand_by).
 pub(super) fn expand_by(
     ldr: &LdrPanorama,
-    network: &dyn Network, options: &NetworkOptions) -> Result<NetworkExpanded> {
-        options.check(network)?;
-        let linear = ldr.linear(options.transfer);
-        let clipped = blend::clipped(ldr);
-        if !ldr.values().as_flattened().iter().any(|v| *v > KEPT) {
-            return Ok(NetworkExpanded { panorama: linear, clipped, estimate: None });
-        }
-        let grid = options.seen(ldr.grid(), network);
-        let shown = match (options.input, options.transfer) {
-            (NetworkInput::Linear, _) => linear.clone(),
-            (NetworkInput::Srgb, Transfer::Srgb) => Panorama::new(ldr.grid(), ldr.values().to_vec()),
-            (NetworkInput::Srgb, Transfer::Gamma(_)) => {
-                Panorama::new(ldr.grid(), linear.pixels().iter().map(|p| p.map(tonemap::srgb)).collect())
-            }
-        };
-        let estimate = surround::run(network, &shown.resample(grid), options.output)?;
-        let (panorama, estimate) =
-            blend::blend(ldr, linear, &estimate.resample(ldr.grid()), network.name(), options.scale)?;
-        Ok(NetworkExpanded { panorama, clipped, estimate: Some(estimate) })
+    network: &dyn Network,
+    options: &NetworkOptions,
+) -> Result<NetworkExpanded> {
+    options.check(network)?;
+    let linear = ldr.linear(options.transfer);
+    let clipped = blend::clipped(ldr);
+    if !ldr.values().as_flattened().iter().any(|v| *v > KEPT) {
+        return Ok(NetworkExpanded { panorama: linear, clipped, estimate: None });
     }
+    let grid = options.seen(ldr.grid(), network);
+    let shown = match (options.input, options.transfer) {
+        (NetworkInput::Linear, _) => linear.clone(),
+        (NetworkInput::Srgb, Transfer::Srgb) => Panorama::new(ldr.grid(), ldr.values().to_vec()),
+        (NetworkInput::Srgb, Transfer::Gamma(_)) => {
+            Panorama::new(ldr.grid(), linear.pixels().iter().map(|p| p.map(tonemap::srgb)).collect())
+        }
+    };
+    let estimate = surround::run(network, &shown.resample(grid), options.output)?;
+    let (panorama, estimate) =
+        blend::blend(ldr, linear, &estimate.resample(ldr.grid()), network.name(), options.scale)?;
+    Ok(NetworkExpanded { panorama, clipped, estimate: Some(estimate) })
+}

@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 
 use super::{Network, NetworkOutput};
+use crate::{Error, Result};
 use veni_image::Panorama;
 use veni_light::sphere::Equirect;
-use crate::{Error, Result};
 
 /// By this many pixels a panorama is continued beyond each of its edges.
 const MARGIN: usize = 64;

@@ -1,8 +1,8 @@
 //! What becomes of a network's values, by networks that are a few lines of Rust.
 
 use super::*;
-use crate::expand::Expand;
 use crate::expand::CLIPPED;
+use crate::expand::Expand;
 
 const GRID: Equirect = Equirect { width: 32, height: 16 };
 

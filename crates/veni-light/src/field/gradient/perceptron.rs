@@ -95,10 +95,14 @@ impl Perceptron {
                 rest = tail;
             }
         }
-        tasks::each(parts.into_iter(), Aligned::default, |scratch, (Conditioned(folded), directions, out)| {
-            let mlp = &self.mlp;
-            pulp::Arch::new().dispatch(Blocks { mlp, folded, directions, out, log: true, scratch });
-        });
+        tasks::each(
+            parts.into_iter(),
+            Aligned::default,
+            |scratch, (Conditioned(folded), directions, out)| {
+                let mlp = &self.mlp;
+                pulp::Arch::new().dispatch(Blocks { mlp, folded, directions, out, log: true, scratch });
+            },
+        );
         out
     }
 

@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::distance;
 use crate::latent::Latent;
 use crate::model::{
-    DecoderConfig, Model, ModelConfig, ModelInfo, ModelKind, Array, VnReluForm, decoder_schema,
+    Array, DecoderConfig, Model, ModelConfig, ModelInfo, ModelKind, VnReluForm, decoder_schema,
 };
 
 struct Case {

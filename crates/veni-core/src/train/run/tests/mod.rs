@@ -9,16 +9,16 @@ mod resuming;
 mod stages;
 
 use super::*;
-use veni_light::random::{Purpose, stream};
-use veni_light::latent::Latent;
-use veni_light::model::Model;
-use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
-use veni_light::sphere::Equirect;
 use crate::train::config::{DecoderBackend, DeviceKind, Devices};
 use crate::train::loss::LossForm;
 use crate::train::presets::Preset;
-use veni_fit::schedule::{LearningRate, WeightSchedule};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use veni_fit::schedule::{LearningRate, WeightSchedule};
+use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
+use veni_light::latent::Latent;
+use veni_light::model::Model;
+use veni_light::random::{Purpose, stream};
+use veni_light::sphere::Equirect;
 
 /// A sky with a sun at `azimuth` over dark ground.
 fn sky(azimuth: f32) -> Panorama {
