@@ -55,6 +55,9 @@ fn a_photograph_stands_upright_as_its_exif_data_says() {
 #[test]
 fn a_truncated_photograph_is_refused() {
     let dir = Dir::new();
-    dir.refused(&["fit", &file("photo_trunc.jpg"), "--fov", "65"], &["photo_trunc.jpg", "truncated JPEG file"]);
+    dir.refused(
+        &["fit", &file("photo_trunc.jpg"), "--fov", "65"],
+        &["photo_trunc.jpg", "truncated JPEG file"],
+    );
     dir.refused(&["fit", &file("trunc.jpg")], &["trunc.jpg", "truncated JPEG file"]);
 }

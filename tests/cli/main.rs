@@ -9,12 +9,12 @@ mod bad_input;
 mod bake;
 #[cfg(feature = "learn")]
 mod crashes;
+#[cfg(feature = "pretrained")]
+mod embedded;
 #[cfg(feature = "learn")]
 mod encode;
 #[cfg(feature = "learn")]
 mod evaluate;
-#[cfg(feature = "pretrained")]
-mod embedded;
 mod expand_with;
 #[cfg(feature = "learn")]
 mod fit;

@@ -73,7 +73,8 @@ fn helper(case: &Case, device: &Device) {
     let (image, mask, start) = (case.data("in.image"), case.data("in.mask"), case.data("in.latent0"));
     let grid = Equirect::new(image.shape[1], image.shape[0]);
     let (images, masks) = ([image.values.as_slice()], [mask.values.as_slice()]);
-    let target = FitTarget::panoramas(grid, &images).and_then(|t| t.masked(&masks)).unwrap_or_else(|e| panic!("{e}"));
+    let target =
+        FitTarget::panoramas(grid, &images).and_then(|t| t.masked(&masks)).unwrap_or_else(|e| panic!("{e}"));
     let last = number(case, "max_steps") as u64;
     let reference = FitConfig::reference_helper(number(case, "lr"), number(case, "lr_final"), last);
     let after = |steps| {

@@ -51,7 +51,7 @@ impl LoadedModel {
         };
         Ok(Self {
             name: name.into(),
-            identity: model.digest(),
+            identity: model.digest().to_string(),
             model: Arc::new(model),
             decoder: Arc::new(decoder),
             device: device.clone(),

@@ -10,7 +10,7 @@
 #![expect(clippy::print_stdout, reason = "an example that prints numbers")]
 
 #[allow(dead_code, reason = "the tests use the rest of it")]
-#[path = "../src/panorama/expand/network/onnx_file.rs"]
+#[path = "../../../crates/veni-data/src/expand/network/onnx_file.rs"]
 mod onnx_file;
 
 use std::time::Instant;

@@ -13,15 +13,15 @@ use std::path::Path;
 use burn::tensor::Device;
 use veni_core::data::coarsen::{averaged, coarse_grid};
 use veni_core::data::{Dataset, panorama_files};
-use veni_eval::figure::{Sheet, display};
-use veni_core::panorama::metrics::{Alignment, log_error, scores};
 use veni_core::field::Decoder;
 use veni_core::fit::{FitConfig, FitDecoder, FitTarget, fit};
 use veni_core::latent::Latent;
 use veni_core::model::Model;
+use veni_core::panorama::metrics::{Alignment, log_error, scores};
 use veni_core::sphere::Equirect;
 use veni_core::vae::Veni;
 use veni_core::{Error, Result};
+use veni_eval::figure::{Sheet, display};
 
 const FULL: Equirect = Equirect { width: 128, height: 64 };
 const STEPS: usize = 8;

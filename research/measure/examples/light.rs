@@ -14,11 +14,11 @@ use burn::tensor::Device;
 use rayon::prelude::*;
 use veni_core::data::coarsen::{averaged, coarse_grid};
 use veni_core::data::{Dataset, panorama_files};
-use veni_core::panorama::metrics::{Alignment, scores, sun_error};
 use veni_core::fit::{FitConfig, FitDecoder, FitTarget, Objective, fit};
 use veni_core::latent::Latent;
 use veni_core::model::Model;
 use veni_core::panorama::luminance;
+use veni_core::panorama::metrics::{Alignment, scores, sun_error};
 use veni_core::sphere::Equirect;
 use veni_core::vae::Veni;
 use veni_core::{Error, Result};
@@ -77,8 +77,7 @@ fn look(model: &Model, image: &[f32], factor: usize, share: f64) -> Result<Look>
     let (decoder, prior) = (model.decoder()?, model.prior());
     let coarse = averaged(GRID, image, factor);
     let images = [coarse.as_slice()];
-    let target =
-        FitTarget::panoramas(coarse_grid(GRID, factor), &images)?.with_prior(&prior);
+    let target = FitTarget::panoramas(coarse_grid(GRID, factor), &images)?.with_prior(&prior);
     let objective = if share > 0.0 { Objective::Energy { share } } else { Objective::LogError };
     let prior_weight = FitConfig::prior_for(start[0].vectors.len());
     let config = FitConfig { objective, prior: prior_weight, ..FitConfig::thorough() };

@@ -9,20 +9,20 @@ use std::path::Path;
 
 use burn::tensor::Device;
 use image::{Rgb, RgbImage};
-use veni_core::data::{Dataset, Item, panorama_files};
-use veni_core::panorama::metrics::Alignment;
-use veni_core::data::Reconstruction;
 use veni_core::LoadedModel;
-use veni_eval::codec::{Autoencoder, Codec, Optimised};
-use veni_eval::fitting::FitSettings;
+use veni_core::data::Reconstruction;
+use veni_core::data::{Dataset, Item, panorama_files};
 use veni_core::latent::Latent;
 use veni_core::model::Model;
 use veni_core::output::{Overwrite, write_atomic};
 use veni_core::panorama::Panorama;
+use veni_core::panorama::metrics::Alignment;
 use veni_core::panorama::tonemap::Tonemap;
 use veni_core::sphere::Equirect;
 use veni_core::vae::Veni;
 use veni_core::{Error, Result};
+use veni_eval::codec::{Autoencoder, Codec, Optimised};
+use veni_eval::fitting::FitSettings;
 
 fn main() -> Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();

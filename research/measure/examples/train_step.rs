@@ -11,12 +11,12 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use veni_core::data::Splits;
+use veni_core::model::Array;
 use veni_core::train::checkpoint::{self, CheckpointInfo};
 use veni_core::train::network::{Network, Prepared};
 use veni_core::train::optimiser::{Group, Optimiser};
 use veni_core::train::presets::Preset;
 use veni_core::train::replicas::{Computed, Replicas};
-use veni_core::model::Array;
 use veni_core::vae::weights::{self, Weights};
 use veni_core::{Error, Result};
 
