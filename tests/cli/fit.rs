@@ -188,7 +188,7 @@ fn a_photograph_is_placed_where_it_was_taken() {
     let refused = |args: &[&str], words: &[&str]| {
         dir.refused(&[&["fit", "--model", model(), "-q"], args].concat(), words);
     };
-    refused(&["clear.png", "--fov", "60"], &["clear.png", "nothing"]);
+    refused(&["clear.png", "--fov", "60"], &["clear.png", "no known pixel"]);
     refused(&["photo.png"], &["photo.png", "twice its height"]);
     refused(&["photo.png", "--fov", "180"], &["180"]);
     mistyped(&dir, &["photo.png", "--fov", "60", "--look", "0,91"], "zenith");
@@ -209,7 +209,7 @@ fn what_cannot_be_fitted_is_refused_before_any_work() {
         dir.refused(&[&["fit", "--model", model(), "-q"], args].concat(), words);
     };
     refused(&[&sky, "--mask", "small.png"], &["small.png", "3 x 2"]);
-    refused(&[&sky, "--mask", "text.exr"], &["text.exr", "PNG"]);
+    refused(&[&sky, "--mask", "text.exr"], &["text.exr", "OpenEXR"]);
     refused(&["broken.png"], &["broken.png"]);
     refused(&["text.exr"], &["text.exr"]);
     refused(&["missing.exr"], &["missing.exr"]);

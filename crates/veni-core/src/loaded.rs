@@ -175,10 +175,14 @@ impl LoadedModel {
         [count("encoder."), count("decoder.")]
     }
 
-    /// How many panoramas it was trained on, if its file says so ("76 panoramas of …").
+    /// How many panoramas it was trained on, if its file says so; files from before that entry say it in words ("76 panoramas
+    /// of …").
     pub fn training_panoramas(&self) -> Option<usize> {
-        let data = &self.model.info().training.as_ref()?.data;
-        let (count, rest) = data.split_once(' ')?;
-        count.parse().ok().filter(|_| rest.starts_with("panorama"))
+        let training = self.model.info().training.as_ref()?;
+        let in_words = || {
+            let (count, rest) = training.data.split_once(' ')?;
+            count.parse().ok().filter(|_| rest.starts_with("panorama"))
+        };
+        training.panoramas.or_else(in_words)
     }
 }

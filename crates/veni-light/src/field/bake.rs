@@ -11,7 +11,7 @@ use crate::sphere::Equirect;
 /// So many directions are faster one by one than as a block with idle lanes.
 const FEW: usize = 6;
 /// Directions of one task: a few blocks, so that all cores finish together.
-const TASK: usize = 192;
+pub(super) const TASK: usize = 192;
 /// Pixels that are decoded before they are handed over: enough to keep all cores busy, and bounded (3 MB).
 const BAND: usize = 1 << 18;
 
@@ -58,10 +58,16 @@ impl Field {
         });
     }
 
-    fn run(&self, directions: &[[f32; 3]], out: &mut [[f32; 3]], log: bool, scratch: &mut Aligned) {
+    pub(super) fn run(
+        &self,
+        directions: &[[f32; 3]],
+        out: &mut [[f32; 3]],
+        log: bool,
+        scratch: &mut Aligned,
+    ) {
         let (mlp, folded, arch) = (&self.weights.mlp, &*self.folded, pulp::Arch::new());
         if directions.len() <= FEW {
-            arch.dispatch(Single { mlp, folded, directions, out, log });
+            arch.dispatch(Single { mlp, folded, directions, out, log, scratch });
         } else {
             arch.dispatch(Blocks { mlp, folded, directions, out, log, scratch });
         }

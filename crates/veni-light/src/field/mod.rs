@@ -20,6 +20,7 @@ mod bake;
 pub(crate) mod bfloat16;
 mod block;
 mod condition;
+mod evaluator;
 pub(crate) mod gradient;
 mod math;
 mod mlp;
@@ -38,6 +39,7 @@ use weights::Weights;
 #[cfg(feature = "training")]
 pub mod training;
 
+pub use evaluator::Evaluator;
 pub use gradient::{Gradient, LocalQuadratic, NormalEquations};
 pub use rate::multiply_add_rate;
 

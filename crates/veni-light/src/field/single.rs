@@ -5,6 +5,7 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::aligned::Aligned;
 use super::block::{EPSILON, PARTIAL, inner_product};
 use super::mlp::{Matrix, Mlp, PANEL};
 use super::{Folded, math};
@@ -21,6 +22,8 @@ pub(super) struct Single<'a> {
     pub(super) out: &'a mut [[f32; 3]],
     /// Log radiance instead of radiance.
     pub(super) log: bool,
+    /// Workspace that the thread keeps.
+    pub(super) scratch: &'a mut Aligned,
 }
 
 impl WithSimd for Single<'_> {
@@ -28,12 +31,16 @@ impl WithSimd for Single<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { mlp, folded, directions, out, log } = self;
-        let mut features = vec![0.0; 5 * (folded.vectors.len() + 2)];
-        let (mut x, mut y) = (vec![0.0; mlp.padded()], vec![0.0; mlp.padded()]);
+        let Self { mlp, folded, directions, out, log, scratch } = self;
+        let (inputs, padded) = (5 * (folded.vectors.len() + 2), mlp.padded());
+        let all = &mut scratch.at_least(inputs + 2 * padded)[..inputs + 2 * padded];
+        // what is padding must be 0
+        all.fill(0.0);
+        let (features, rest) = all.split_at_mut(inputs);
+        let (x, y) = rest.split_at_mut(padded);
         for (direction, out) in directions.iter().zip(out) {
-            encode(simd, folded, *direction, &mut features);
-            let rgb = network::<S>(mlp, folded, &features, &mut x, &mut y);
+            encode(simd, folded, *direction, features);
+            let rgb = network::<S>(mlp, folded, features, x, y);
             *out = rgb.map(|value| {
                 let value = value + folded.log_exposure;
                 if log { value } else { first(math::exp(simd, simd.splat_f32s(value))) }

@@ -31,6 +31,9 @@ pub struct ModelInfo {
 pub struct Training {
     /// The data set, in words.
     pub data: String,
+    /// Number of photographed panoramas trained on; absent in files written before there was this entry.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub panoramas: Option<usize>,
     /// Optimiser steps taken.
     pub steps: u64,
     /// Seed of the run.

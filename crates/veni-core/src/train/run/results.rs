@@ -109,6 +109,7 @@ impl Trainer {
         let info = ModelInfo {
             training: Some(Training {
                 data: self.describe_data(),
+                panoramas: Some(self.splits.train.len().saturating_sub(self.config.data.synthetic)),
                 steps: step,
                 seed: self.config.seed,
                 command: self.command.clone(),

@@ -7,6 +7,8 @@ use super::*;
 #[test]
 fn gradients_of_the_whole_loss_match_finite_differences() {
     let (folder, mut config) = setup(1);
+    // of some seeds a ReLU switches within every step
+    config.seed = 2;
     config.loss.ldr_mse = WeightSchedule::Constant(1.0);
     // |·| has a kink at every pixel whose gradient error is 0; too many for a finite step in f32
     config.loss.mage = WeightSchedule::Constant(0.0);

@@ -84,7 +84,7 @@ fn kernels_give_the_values_and_gradients_of_tensor_operations() {
         let expected = by_tensors(&decoder, &latent, directions);
         let found = by_kernels(&decoder, &latent, flat.as_chunks().0, size[3]);
         for (name, difference) in differences(&expected, &found) {
-            assert!(difference < 3e-5, "{size:?}: {name} differs by {difference}");
+            assert!(difference < 5e-5, "{size:?}: {name} differs by {difference}");
         }
     }
 }

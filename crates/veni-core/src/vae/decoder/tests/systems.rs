@@ -43,7 +43,7 @@ fn systems() -> Vec<DecoderConfig> {
 }
 
 fn build(config: &DecoderConfig, device: &Device) -> Decoder {
-    Decoder::new(config, N, &mut Stream::from_seed(7), device)
+    Decoder::new(config, N, &mut Stream::from_seed(8), device)
 }
 
 fn name(config: &DecoderConfig) -> String {
