@@ -76,7 +76,7 @@ fn every_way_to_condition_learns_in_both_systems() {
             let mut config = config.with_overrides(&options).unwrap();
             config.augment = veni_data::AugmentConfig::default();
             // from many seeds an encoder under FiLM stays on a plateau for longer than a test should take
-            config.seed = 4;
+            config.seed = if conditioning == "film" { 4 } else { 0 };
             let (folder, config) = setup_of(config, 120);
             let out = folder.path().join("run");
             complete(&mut Trainer::create(&out, config.clone(), "test").unwrap());
