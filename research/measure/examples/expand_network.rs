@@ -18,7 +18,6 @@ use veni_core::random::Stream;
 
 use onnx_file::OnnxFile;
 use veni_core::expand::Expand;
-use veni_core::expand::Expand;
 use veni_core::expand::ExpandOptions;
 use veni_core::expand::network::{NetworkOptions, OnnxNetwork};
 use veni_core::panorama::{LdrPanorama, Transfer};

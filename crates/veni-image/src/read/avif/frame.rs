@@ -62,7 +62,7 @@ impl Frame {
         let scale = Scale::new(self.bits, self.coding().full_range);
         let [width, height] = self.size();
         let row = |y: usize| (0..width).map(move |x| (x, y));
-        (0..height).flat_map(row).map(|(x, y)| scale.luma(luma.at(x, y)).clamp(0.0, 1.0) as f32).collect()
+        (0..height).flat_map(row).map(|(x, y)| scale.luma(luma.at(x, y)).clamp(0.0, 1.0)).collect()
     }
 
     /// Display values, row-major.
