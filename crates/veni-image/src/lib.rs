@@ -1,6 +1,6 @@
 //! High-dynamic-range panoramas: reading, cleaning, resampling, showing and writing them.
 //!
-//! A [`Panorama`] is linear radiance on an [`Equirect`] grid, Rec. 709 primaries and D65 white, row-major with
+//! A [`Panorama`] is linear radiance on an [`Equirect`](veni_light::sphere::Equirect) grid, Rec. 709 primaries and D65 white, row-major with
 //! row 0 on top; which direction a pixel looks in is said in [`veni_light::sphere`]. Radiance has no absolute unit:
 //! the model is scale-free, and whoever removes an exposure records it.
 //!

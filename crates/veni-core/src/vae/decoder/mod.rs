@@ -74,7 +74,7 @@ impl Decoder {
     /// The decoder of a model file.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the model's tensors are not those its configuration implies.
+    /// [`Error::Invalid`](crate::Error::Invalid) if the model's tensors are not those its configuration implies.
     pub fn from_model(model: &Model, device: &Device) -> Result<Self> {
         // every weight is replaced; the generator's only part is to give them a shape
         let mut rng = Stream::from_seed(0);
