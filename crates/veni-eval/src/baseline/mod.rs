@@ -11,7 +11,8 @@
 //! implementation's own forms, which golden files test, are in [`harmonics::reference`] and [`gaussians::reference`].
 //!
 //! ```
-//! # use veni_core::{Result, baseline::{Baseline, Kind, Space}, sphere::Equirect};
+//! # use veni_eval::{Result, baseline::{Baseline, Kind, Space}};
+//! # use veni_light::sphere::Equirect;
 //! # fn main() -> Result<()> {
 //! let grid = Equirect::new(32, 16);
 //! let sky: Vec<f32> = grid.directions().iter().flat_map(|d| [d[2], 0.5 * d[0], 1.0]).collect();
