@@ -8,12 +8,13 @@ mod whole_loss;
 
 pub use veni_fit::{
     Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective,
-    Observation, PanoramaLoss, Plateau, from_each, loss, matching_exposure, random_starts, schedule, shade,
+    Observation, PanoramaLoss, Plateau, fit_shaded, from_each, loss, matching_exposure, random_starts,
+    schedule, shade,
 };
 
 use burn::tensor::Device;
 use veni_light::field;
-use veni_light::latent::{Latent, Prior};
+use veni_light::latent::Latent;
 
 use crate::{Result, vae};
 use whole_loss::WholeLoss;
@@ -111,37 +112,4 @@ pub fn best_of<'a>(
     from_each(starts, config, observer, |start, observer| {
         fit_observed(decoder, target, start, config, observer)
     })
-}
-
-/// [`veni_fit::best_light`] for either kind of decoder.
-///
-/// # Errors
-/// As [`fit_shaded`].
-///
-/// # Panics
-/// If there is no start.
-pub fn best_light<'a>(
-    decoder: impl Into<FitDecoder<'a>>,
-    image: &shade::ShadedImage,
-    prior: Option<&Prior>,
-    starts: &[Latent],
-    config: &FitConfig,
-    observer: &mut dyn FnMut(u64, f64),
-) -> Result<Best> {
-    veni_fit::best_light(decoder.into().as_dyn(), image, prior, starts, config, observer)
-}
-
-/// [`veni_fit::fit_shaded`] for either kind of decoder.
-///
-/// # Errors
-/// As [`veni_fit::fit_shaded`].
-pub fn fit_shaded<'a>(
-    decoder: impl Into<FitDecoder<'a>>,
-    images: &[shade::ShadedImage],
-    prior: Option<&Prior>,
-    start: &[Latent],
-    config: &FitConfig,
-    observer: &mut dyn FnMut(u64, f64),
-) -> Result<FitResult> {
-    veni_fit::fit_shaded(decoder.into().as_dyn(), images, prior, start, config, observer)
 }

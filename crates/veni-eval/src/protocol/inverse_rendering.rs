@@ -208,7 +208,7 @@ fn fitted(subject: &LoadedModel, grid: Equirect, item: &Item, set: Set, ks: f32)
     let config = FitConfig { prior: PRIOR, free_exposure: true, ..FitConfig::light().in_steps(set.steps) };
     let (images, prior, starts) = ([image], subject.prior(), [start]);
     let FitResult { latents, last, .. } =
-        fit_shaded(subject.fit_decoder(), &images, Some(&prior), &starts, &config, &mut |_, _| {})?;
+        fit_shaded(subject.fit_decoder().as_dyn(), &images, Some(&prior), &starts, &config, &mut |_, _| {})?;
     let vectors = latents.into_iter().next().map(|z| z.vectors).unwrap_or_default();
     Ok(Found { vectors, loss: last.into_iter().sum() })
 }

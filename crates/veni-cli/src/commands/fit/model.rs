@@ -1,6 +1,10 @@
 //! The model that a picture's latent is fitted to: its decoder in whichever form it runs, and its encoder.
 
 use anyhow::Result;
+#[cfg(feature = "learn")]
+use veni_core::fit::best_of;
+#[cfg(not(feature = "learn"))]
+use veni_fit::best_of;
 use veni_fit::{Best, Encoder, FitConfig, FitTarget, LatentDecoder};
 use veni_light::latent::{Latent, Prior};
 use veni_light::model::Model;
@@ -77,7 +81,6 @@ impl FitModel {
     }
 
     /// The best of the fits from every start.
-    #[cfg(feature = "learn")]
     pub(super) fn best_of(
         &self,
         target: &FitTarget<'_>,
@@ -86,23 +89,10 @@ impl FitModel {
         observer: &mut dyn FnMut(u64, f64),
     ) -> veni_light::Result<Best> {
         match &self.decoder {
-            Decoder::Folded(decoder) => veni_core::fit::best_of(decoder, target, starts, config, observer),
-            Decoder::Graph(decoder) => {
-                veni_core::fit::best_of(decoder.as_ref(), target, starts, config, observer)
-            }
+            Decoder::Folded(decoder) => best_of(decoder, target, starts, config, observer),
+            #[cfg(feature = "learn")]
+            Decoder::Graph(decoder) => best_of(decoder.as_ref(), target, starts, config, observer),
         }
-    }
-
-    /// The best of the fits from every start.
-    #[cfg(not(feature = "learn"))]
-    pub(super) fn best_of(
-        &self,
-        target: &FitTarget<'_>,
-        starts: &[Latent],
-        config: &FitConfig,
-        observer: &mut dyn FnMut(u64, f64),
-    ) -> veni_light::Result<Best> {
-        veni_fit::best_of(self.decoder(), target, starts, config, observer)
     }
 }
 
