@@ -75,10 +75,10 @@ fn images(case: &Case) {
     image("out.srgb_q2_noclamp", &|| narrow_gt.iter().map(|v| srgb(v / 2.0)).collect());
     for (prefix, alignment) in [("scaled", Alignment::LogFactor), ("unscaled", Alignment::None)] {
         let s = scores(&prediction.values, &target.values, height, width, alignment);
-        scalar(&format!("out.{prefix}.psnr_hdr"), &|| s.psnr_hdr);
-        scalar(&format!("out.{prefix}.psnr_ldr"), &|| s.psnr_ldr);
-        scalar(&format!("out.{prefix}.ssim_hdr"), &|| s.ssim_hdr);
-        scalar(&format!("out.{prefix}.ssim_ldr"), &|| s.ssim_ldr);
+        scalar(&format!("out.{prefix}.psnr_hdr"), &|| s.hdr_psnr);
+        scalar(&format!("out.{prefix}.psnr_ldr"), &|| s.ldr_psnr);
+        scalar(&format!("out.{prefix}.ssim_hdr"), &|| s.hdr_ssim);
+        scalar(&format!("out.{prefix}.ssim_ldr"), &|| s.ssim);
     }
     scalar("out.ldr_psnr", &|| {
         psnr(&channels_last(case.data("in.ldr_b")).0, &channels_last(case.data("in.ldr_target_for_psnr")).0)

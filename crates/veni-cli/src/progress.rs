@@ -22,8 +22,6 @@ struct Work {
     bar: Bar,
     what: String,
     done: u64,
-    #[cfg(feature = "learn")]
-    total: Option<u64>,
 }
 
 impl Bars {
@@ -40,13 +38,8 @@ impl Bars {
     pub(crate) fn begin_after(&self, done: u64, what: &str, unit: &str, total: Option<u64>) {
         let mut current = self.current();
         end(&mut current);
-        *current = Some(Work {
-            bar: Bar::start(self.report, unit, done, total),
-            what: what.to_owned(),
-            done,
-            #[cfg(feature = "learn")]
-            total,
-        });
+        *current =
+            Some(Work { bar: Bar::start(self.report, unit, done, total), what: what.to_owned(), done });
     }
 
     /// `done` units are done in all.

@@ -3,17 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::parallel::parallel;
 use crate::pixels::Pixels;
 use crate::{Error, Result};
 use veni_image::Panorama;
 use veni_image::exposure::centre_exposure;
+use veni_light::progress::{Observer, Silent};
 use veni_light::sphere::Equirect;
-
-/// Progress of reading and generating: panoramas that are there, and panoramas in all. Reported from several threads.
-pub type ProgressCallback<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// One panorama, ready for use.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,19 +72,16 @@ impl Dataset {
     /// # Errors
     /// The first file (in order) that cannot be read, by name.
     pub fn load(files: &[PathBuf], grid: Equirect) -> Result<Self> {
-        Self::load_with_progress(files, grid, &|_, _| {})
+        Self::load_observed(files, grid, &Silent)
     }
 
-    /// [`Dataset::load`], reporting its progress.
+    /// [`Dataset::load`] with an observer of its progress.
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn load_with_progress(
-        files: &[PathBuf],
-        grid: Equirect,
-        progress: ProgressCallback<'_>,
-    ) -> Result<Self> {
-        Ok(Self::new(grid, load(files, grid, |_, item| Ok(item), progress)?))
+    pub fn load_observed(files: &[PathBuf], grid: Equirect, observer: &dyn Observer) -> Result<Self> {
+        observer.begin("panorama", "loading", 0, files.len());
+        Ok(Self::new(grid, load(files, grid, |_, item| Ok(item), observer)?))
     }
 
     /// Only the panoramas that are wanted.
@@ -125,17 +119,17 @@ impl Dataset {
     }
 }
 
-/// Reads files, in parallel; each panorama goes through `keep` with its place in the list.
+/// Reads files, in parallel; each panorama goes through `keep` with its place in the list, and advances the
+/// observer by one.
 pub(super) fn load(
     files: &[PathBuf],
     grid: Equirect,
     keep: impl Fn(usize, Item) -> Result<Item> + Sync,
-    progress: ProgressCallback<'_>,
+    observer: &dyn Observer,
 ) -> Result<Vec<Item>> {
-    let done = AtomicUsize::new(0);
     parallel(files.len(), |at| {
         let item = keep(at, read_item(&files[at], grid)?)?;
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, files.len());
+        observer.advance(1);
         Ok(item)
     })
 }

@@ -19,7 +19,7 @@ mod store;
 pub use veni_light::{Error, Result};
 
 pub use augment::AugmentConfig;
-pub use dataset::{Dataset, Item, ProgressCallback, panorama_files};
+pub use dataset::{Dataset, Item, panorama_files};
 pub use fold::Fold;
 pub use pixel_storage::PixelStorage;
 pub use pixels::Pixels;

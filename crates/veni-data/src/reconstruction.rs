@@ -6,15 +6,15 @@ use serde::Serialize;
 
 use crate::Result;
 use crate::{Dataset, Item};
-use veni_image::metrics::{self, Alignment, MeanScores};
+use veni_image::metrics::{self, Alignment, Scores};
 
 /// Scores of a set of panoramas.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reconstruction {
     /// Name and scores of each panorama, in the set's order.
-    pub images: Vec<(String, MeanScores)>,
+    pub images: Vec<(String, Scores)>,
     /// Their mean; all NaN for an empty set.
-    pub mean: MeanScores,
+    pub mean: Scores,
 }
 
 impl Reconstruction {
@@ -54,14 +54,8 @@ impl Reconstruction {
     /// Panoramas that [`by_parts`](Self::by_parts) decodes together.
     pub const PART: usize = 64;
 
-    fn of(images: Vec<(String, MeanScores)>) -> Self {
-        let n = images.len() as f64;
-        let mean = |f: &dyn Fn(&MeanScores) -> f64| images.iter().map(|(_, s)| f(s)).sum::<f64>() / n;
-        let mean = MeanScores {
-            ldr_psnr: mean(&|s| s.ldr_psnr),
-            hdr_psnr: mean(&|s| s.hdr_psnr),
-            ssim: mean(&|s| s.ssim),
-        };
+    fn of(images: Vec<(String, Scores)>) -> Self {
+        let mean = Scores::mean(images.iter().map(|(_, scores)| scores));
         Self { images, mean }
     }
 }
@@ -72,11 +66,10 @@ fn rated(
     first: usize,
     decoded: &[Vec<f32>],
     alignment: Alignment,
-) -> Vec<(String, MeanScores)> {
+) -> Vec<(String, Scores)> {
     let (width, height) = (dataset.grid().width, dataset.grid().height);
     let rate = |(item, decoded): (&Item, &Vec<f32>)| {
-        let s = metrics::scores(decoded, &item.log_radiance, height, width, alignment);
-        (item.name(), MeanScores { ldr_psnr: s.psnr_ldr, hdr_psnr: s.psnr_hdr, ssim: s.ssim_ldr })
+        (item.name(), metrics::scores(decoded, &item.log_radiance, height, width, alignment))
     };
     dataset.items()[first..].iter().zip(decoded).map(rate).collect()
 }

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::dataset::{Dataset, Item, ProgressCallback, load, panorama_files};
+use super::dataset::{Dataset, Item, load, panorama_files};
 use super::fold::Fold;
 use super::prepare::capture;
 use super::store::PixelStore;
 use crate::{Error, Result};
+use veni_light::progress::{Observer, Silent};
 use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 use veni_synth::{Overrides, Scene, render};
@@ -78,18 +78,18 @@ impl Splits {
     /// [`Error::Invalid`] without folders, without any training panorama, or if there is not the space for a large set;
     /// otherwise as [`Dataset::load`].
     pub fn open(config: &DataConfig, seed: u64) -> Result<Self> {
-        Self::open_with_progress(config, seed, &std::env::temp_dir(), &|_, _| {})
+        Self::open_observed(config, seed, &std::env::temp_dir(), &Silent)
     }
 
-    /// [`Splits::open`] with another folder where [`DataConfig::scratch`] is absent, telling how far it has come.
+    /// [`Splits::open`] with another folder where [`DataConfig::scratch`] is absent, and an observer of its progress.
     ///
     /// # Errors
     /// As [`Splits::open`].
-    pub fn open_with_progress(
+    pub fn open_observed(
         config: &DataConfig,
         seed: u64,
         scratch: &Path,
-        progress: ProgressCallback<'_>,
+        observer: &dyn Observer,
     ) -> Result<Self> {
         if config.folders.is_empty() && config.synthetic == 0 {
             return Err(Error::invalid("no data: name at least one folder of EXR or HDR panoramas"));
@@ -155,13 +155,14 @@ impl Splits {
         let (learned, files) = (train.len(), [train, val].concat());
         let all = files.len().saturating_add(config.synthetic);
         let store = PixelStore::new(all, grid, config.memory_mib, scratch)?;
-        let mut items = load(&files, grid, |at, item| store.keep(at, item), &|done, _| progress(done, all))?;
+        observer.begin("panorama", "loading", 0, all);
+        let mut items = load(&files, grid, |at, item| store.keep(at, item), observer)?;
         items.extend(generated(
             config.synthetic,
             seed,
             grid,
             |at, item| store.keep(files.len() + at, item),
-            &|done, _| progress(files.len() + done, all),
+            observer,
         )?);
         store.seal(&mut items)?;
         let val = items.drain(learned..files.len()).collect();
@@ -190,15 +191,14 @@ fn generated(
     seed: u64,
     grid: Equirect,
     keep: impl Fn(usize, Item) -> Result<Item> + Sync,
-    progress: ProgressCallback<'_>,
+    observer: &dyn Observer,
 ) -> Result<Vec<Item>> {
-    let done = AtomicUsize::new(0);
     let make = |index: usize| {
         let panorama = render(&Scene::draw(seed, index as u64, &Overrides::default()), grid);
         let path = format!("synth-{index:06}");
         let item = Item { generated: true, ..Item::new(Path::new(&path), &panorama, grid) };
         let item = keep(index, item)?;
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
+        observer.advance(1);
         Ok(item)
     };
     (0..count).into_par_iter().map(make).collect()

@@ -8,7 +8,7 @@
 
 #![allow(clippy::print_stdout, reason = "an example")]
 
-use veni_light::field::Field;
+use veni_light::field::Evaluator;
 use veni_light::latent::Latent;
 use veni_light::model::Model;
 use veni_light::random::{Purpose, stream};
@@ -23,6 +23,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = Model::pretrained();
     // two stops brighter, for the picture's sake
     let field = model.decoder()?.condition(&Latent::from_seed(&model.prior(), 19))?.brightened(2.0);
+    // keeps its workspace from ray to ray; a renderer has one per thread
+    let mut sky = field.evaluator();
     let [width, height] = SIZE;
     let mut picture = format!("P6 {width} {height} 255\n").into_bytes();
     for pixel in 0..width * height {
@@ -32,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut sum = [0.0; 3];
         for _ in 0..SAMPLES {
             let random = &mut || unit([0; 3].map(|_| rng.normal() as f32));
-            let light = trace(&field, [-4.0, 0.0, 1.0], unit([1.5, -u, v - 0.25]), random);
+            let light = trace(&mut sky, [-4.0, 0.0, 1.0], unit([1.5, -u, v - 0.25]), random);
             sum = add(sum, 1.0 / SAMPLES as f32, light);
         }
         picture.extend(sum.map(|v| (255.0 * (v / (1.0 + v)).powf(1.0 / 2.2)) as u8));
@@ -43,12 +45,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// All surfaces are diffuse: a path goes on in a direction distributed by the cosine.
-fn trace(field: &Field, mut from: Vector, mut along: Vector, random: &mut impl FnMut() -> Vector) -> Vector {
+fn trace(
+    sky: &mut Evaluator,
+    mut from: Vector,
+    mut along: Vector,
+    random: &mut impl FnMut() -> Vector,
+) -> Vector {
     let mut weight = 1.0;
     for _ in 0..4 {
         let Some((distance, normal)) = hit(from, along) else {
             // the whole interface: a direction (z up) in, linear Rec. 709 out
-            return field.radiance(along).map(|v| weight * v);
+            return sky.radiance(along).map(|v| weight * v);
         };
         from = add(add(from, distance, along), 1e-3, normal);
         along = unit(add(normal, 1.0, random()));

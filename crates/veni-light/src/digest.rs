@@ -70,7 +70,7 @@ impl FromStr for Digest {
         let number = u64::from_str_radix(text, 16).ok().filter(|_| digits);
         number
             .map(|number| Self(number.to_be_bytes()))
-            .ok_or_else(|| Error::invalid(format!("{text:?} is no digest: 16 digits of 0-9, a-f")))
+            .ok_or_else(|| Error::invalid(format!("{text:?} is not a digest: 16 digits of 0-9, a-f")))
     }
 }
 
@@ -96,7 +96,7 @@ mod tests {
         assert!(small < Digest::of("abc"));
         for text in ["", "ff", "BA7816BF8F01CFEA", "+a7816bf8f01cfea", "ba7816bf8f01cfeag", "ba7816bf8f01cfé"]
         {
-            assert!(text.parse::<Digest>().unwrap_err().to_string().contains("no digest"), "{text}");
+            assert!(text.parse::<Digest>().unwrap_err().to_string().contains("not a digest"), "{text}");
         }
     }
 }

@@ -10,6 +10,7 @@
 //! | [`random`] | streams of random numbers that are the same on every machine |
 //! | [`cholesky`] | small dense systems of equations |
 //! | [`digest`] | content as one short name |
+//! | [`progress`] | who is told how far long work has come |
 //! | [`output`] | files that are written beside their target and renamed |
 //!
 //! # Glossary
@@ -45,6 +46,7 @@ pub mod field;
 pub mod latent;
 pub mod model;
 pub mod output;
+pub mod progress;
 pub mod random;
 pub mod sphere;
 

@@ -63,7 +63,7 @@ fn main() -> Result<()> {
         let energy = |latent: &Latent| prior.energy(&latent.vectors).0 / per;
         let fitted = latents.iter().map(decode).collect::<Result<Vec<_>>>()?;
         let scored: Vec<_> = (fitted.iter().zip(&coarse))
-            .map(|(a, b)| scores(a, b, grid.height, grid.width, Alignment::Exposure).psnr_ldr)
+            .map(|(a, b)| scores(a, b, grid.height, grid.width, Alignment::Exposure).ldr_psnr)
             .collect();
         let errors: Vec<_> = fitted.iter().zip(&coarse).map(|(a, b)| log_error(a, b).sqrt()).collect();
         let (mut largest, mut length, mut middles) = (Vec::new(), Vec::new(), Vec::new());

@@ -92,8 +92,8 @@ fn look(model: &Model, image: &[f32], factor: usize, share: f64) -> Result<Look>
         .enumerate()
         .map(|(k, (a, b))| GRID.solid_angle(k / (3 * GRID.width)) * f64::from(a - b).powi(2));
     Ok(Look {
-        ldr_psnr: scored.psnr_ldr,
-        hdr_psnr: scored.psnr_hdr,
+        ldr_psnr: scored.ldr_psnr,
+        hdr_psnr: scored.hdr_psnr,
         log_error: (error.sum::<f64>() / (3.0 * 4.0 * std::f64::consts::PI)).sqrt(),
         sun: sun_error(GRID, &decoded, image),
         irradiance: irradiance_error(&decoded, image),

@@ -126,16 +126,16 @@ fn print(path: &Path, output: Option<&PathBuf>, encoded: &Encoded, report: Repor
         let value = json!({
             "panorama": path.display().to_string(),
             "output": output.map(|o| o.display().to_string()),
-            "ldr_psnr": encoded.scores.psnr_ldr,
-            "hdr_psnr": encoded.scores.psnr_hdr,
-            "ssim": encoded.scores.ssim_ldr,
+            "ldr_psnr": encoded.scores.ldr_psnr,
+            "hdr_psnr": encoded.scores.hdr_psnr,
+            "ssim": encoded.scores.ssim,
             "latent": serde_json::from_str::<serde_json::Value>(&text)?,
         });
         return report.result("", &value);
     }
     match output {
         Some(output) => {
-            let (n, psnr) = (encoded.latent.vectors.len(), encoded.scores.psnr_ldr);
+            let (n, psnr) = (encoded.latent.vectors.len(), encoded.scores.ldr_psnr);
             let stops = encoded.latent.log_exposure / std::f32::consts::LN_2;
             let human = format!(
                 "{}: {n} vectors, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB",

@@ -186,7 +186,7 @@ impl Evaluate {
         let lpips =
             if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
         let bars = Bars::new(report);
-        let data = Dataset::load_with_progress(&files, grid, &|done, all| bars.loading(done, all));
+        let data = Dataset::load_observed(&files, grid, &bars);
         bars.end();
         let data = data.map_err(with_remedy)?;
         inputs::create_folder(&self.out)?;

@@ -302,9 +302,9 @@ impl Fit {
                 "known_share": known,
                 "loss": best.loss,
                 "losses": best.losses,
-                "ldr_psnr": scores.map(|s| s.psnr_ldr),
-                "hdr_psnr": scores.map(|s| s.psnr_hdr),
-                "ssim": scores.map(|s| s.ssim_ldr),
+                "ldr_psnr": scores.map(|s| s.ldr_psnr),
+                "hdr_psnr": scores.map(|s| s.hdr_psnr),
+                "ssim": scores.map(|s| s.ssim),
                 "seconds": seconds,
                 "latent": serde_json::from_str::<serde_json::Value>(&text)?,
             });
@@ -314,7 +314,7 @@ impl Fit {
         let stops = best.latent.log_exposure / std::f32::consts::LN_2;
         let n = best.latent.vectors.len();
         let quality = match (scores, known) {
-            (Some(s), _) => format!("LDR PSNR {:.1} dB", s.psnr_ldr),
+            (Some(s), _) => format!("LDR PSNR {:.1} dB", s.ldr_psnr),
             (None, Some(known)) => format!("{:.0} % of the sphere known", 100.0 * known),
             (None, None) => "from a shaded surface".to_owned(),
         };

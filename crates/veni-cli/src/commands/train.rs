@@ -69,8 +69,7 @@ impl Train {
         let config = self.settings()?;
         let replace = self.check_folder()?;
         let bars = Bars::new(report);
-        let trainer =
-            Trainer::prepare(&self.out, config, &self.command_line(), &|done, all| bars.loading(done, all));
+        let trainer = Trainer::prepare(&self.out, config, &self.command_line(), &bars);
         bars.end();
         let trainer = trainer.map_err(|e| self.with_options(e))?;
         if replace {
@@ -108,9 +107,7 @@ impl Train {
         self.check_same(&stored)?;
         let storage = self.pixel_storage(&stored)?;
         let bars = Bars::new(report);
-        let trainer = Trainer::resume_with(&self.out, &self.command_line(), &storage, &|done, all| {
-            bars.loading(done, all);
-        });
+        let trainer = Trainer::resume_with(&self.out, &self.command_line(), &storage, &bars);
         bars.end();
         trainer.map_err(with_remedy)
     }

@@ -1,29 +1,11 @@
 //! Progress as the library reports it.
 
 use veni_core::train::progress::{Progress, StepReport, ValidationReport};
-use veni_eval::protocol::Observer;
-use veni_image::metrics::MeanScores;
+
+use veni_image::metrics::Scores;
+use veni_light::progress::Observer;
 
 use super::Bars;
-
-/// What reading panoramas is called.
-const LOADING: &str = "loading";
-/// Threads overtake one another by fewer panoramas than this; the next set falls back by more.
-const OVERTAKEN: u64 = 64;
-
-impl Bars {
-    /// `done` of `all` panoramas are there; where they are read in several sets, each has a bar.
-    pub(crate) fn loading(&self, done: usize, all: usize) {
-        let (done, all) = (done as u64, all as u64);
-        let is_same = self.current().as_ref().is_some_and(|work| {
-            work.what == LOADING && work.total == Some(all) && done + OVERTAKEN > work.done
-        });
-        if !is_same {
-            self.begin(LOADING, "panorama", Some(all));
-        }
-        self.advance(done, "");
-    }
-}
 
 impl Observer for Bars {
     fn begin(&self, unit: &'static str, task: &str, done: usize, total: usize) {
@@ -54,7 +36,7 @@ impl Progress for &Bars {
 
     fn validation(&mut self, report: &ValidationReport) {
         let psnr = |name, scores: &Option<_>| {
-            scores.as_ref().map(|s: &MeanScores| format!("{name} {:.2} dB", s.ldr_psnr))
+            scores.as_ref().map(|s: &Scores| format!("{name} {:.2} dB", s.ldr_psnr))
         };
         let scores: Vec<_> =
             [psnr("val", &report.val), psnr("train", &report.train)].into_iter().flatten().collect();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use veni_image::metrics::MeanScores;
+use veni_image::metrics::Scores;
 
 /// One update, as written to `metrics.jsonl` and shown to the user.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -34,9 +34,9 @@ pub struct ValidationReport {
     /// After how many updates.
     pub step: u64,
     /// Mean over the validation panoramas, auto-encoder pass; absent without any.
-    pub val: Option<MeanScores>,
+    pub val: Option<Scores>,
     /// Mean over the validated training panoramas.
-    pub train: Option<MeanScores>,
+    pub train: Option<Scores>,
     /// Whether this became `model.safetensors`.
     pub best: bool,
 }
@@ -64,8 +64,6 @@ pub trait Progress {
     }
 }
 
-/// Nobody is listening.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Silent;
+pub use veni_light::progress::Silent;
 
 impl Progress for Silent {}

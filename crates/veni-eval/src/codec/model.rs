@@ -51,7 +51,7 @@ impl<'a> Optimised<'a> {
     /// LDR PSNR of one latent under exposure alignment.
     fn display_score(&self, grid: Equirect, image: &[f32], latent: &[Latent]) -> Result<f64> {
         let decoded = self.subject.decode(grid, latent)?.concat();
-        Ok(scores(&decoded, image, grid.height, grid.width, Alignment::Exposure).psnr_ldr)
+        Ok(scores(&decoded, image, grid.height, grid.width, Alignment::Exposure).ldr_psnr)
     }
 }
 

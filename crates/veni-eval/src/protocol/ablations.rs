@@ -47,7 +47,7 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
         ];
         row.extend(three(pass.as_ref().map(|q| &q.reference)));
         row.extend(three(Some(&optimised.reference)));
-        row.push(pass.map_or_else(no_encoder, |q| Cell::Number(q.exposure.ldr_psnr, 2)));
+        row.push(pass.map_or_else(no_encoder, |q| Cell::Number(q.exposure.scores.ldr_psnr, 2)));
         row.push(consistency::standard(run, subject)?);
         row.push(equivariance::by_one_stripe(run, subject)?);
         table.push(row);
@@ -73,5 +73,5 @@ fn no_encoder() -> Cell {
 fn three(scored: Option<&Scored>) -> [Cell; 3] {
     let Some(s) = scored else { return [(); 3].map(|()| no_encoder()) };
     let lpips = s.lpips.map_or_else(|| Cell::missing("no weights"), |v| Cell::Number(v, 3));
-    [Cell::Number(s.ldr_psnr, 2), Cell::Number(s.ssim, 3), lpips]
+    [Cell::Number(s.scores.ldr_psnr, 2), Cell::Number(s.scores.ssim, 3), lpips]
 }

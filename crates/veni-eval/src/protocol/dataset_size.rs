@@ -43,7 +43,7 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
             ];
             table.push(first.into_iter().chain(mean.cells()).collect());
             let name = curve(subject, codec.pass());
-            let point = [size as f64, mean.exposure.ldr_psnr];
+            let point = [size as f64, mean.exposure.scores.ldr_psnr];
             match series.iter_mut().find(|s| s.name == name) {
                 Some(known) => known.points.push(point),
                 None => series.push(Series { name, points: vec![point], joined: true }),

@@ -84,7 +84,7 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
                 each.push(first.into_iter().chain(one.cells(*ks)).collect());
             }
             let mean = mean(&rows);
-            line.push([f64::from(*ks), mean.quality.exposure.ldr_psnr]);
+            line.push([f64::from(*ks), mean.quality.exposure.scores.ldr_psnr]);
             let first = [Cell::text(subject.name()), Cell::Number(subject.dimension() as f64, 0)];
             means.push(first.into_iter().chain(mean.cells(*ks)).collect());
         }

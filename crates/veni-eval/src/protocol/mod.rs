@@ -45,6 +45,7 @@ use super::table::Table;
 use crate::Result;
 use veni_core::LoadedModel;
 use veni_data::Dataset;
+use veni_light::progress::Observer;
 
 /// What can be chosen about the protocols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,15 +64,6 @@ impl Default for Settings {
     fn default() -> Self {
         Self { seed: 0, quick: false, pairs: None, frames: 9 }
     }
-}
-
-/// Observer of an evaluation's progress. Reported from several threads.
-pub trait Observer: Sync {
-    /// A task begins that takes `total` units ("panorama"), `done` of them kept from an earlier run.
-    fn begin(&self, unit: &'static str, task: &str, done: usize, total: usize);
-
-    /// This many more units are done.
-    fn advance(&self, units: usize);
 }
 
 /// Everything that a protocol works with.

@@ -15,7 +15,7 @@ use crate::store::Key;
 use crate::table::Cell;
 use veni_data::Item;
 use veni_data::parallel::parallel;
-use veni_image::metrics::{Alignment, scores, sun_error};
+use veni_image::metrics::{Alignment, Scores, scores, sun_error};
 use veni_image::tonemap::srgb_q98;
 use veni_light::sphere::Equirect;
 
@@ -40,11 +40,9 @@ pub(super) const NOTE: &str = "PSNR in dB, mean over panoramas. (ref.): the refe
 /// Scores of one definition.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Scored {
-    pub(super) ldr_psnr: f64,
-    pub(super) ssim: f64,
+    pub(super) scores: Scores,
     /// Absent without weights.
     pub(super) lpips: Option<f64>,
-    pub(super) hdr_psnr: f64,
 }
 
 /// Scores under the reference's definition and under exposure alignment.
@@ -116,7 +114,6 @@ fn score(
     lpips: Option<&Lpips>,
 ) -> Result<Scored> {
     let Equirect { width, height } = grid;
-    let s = scores(prediction, target, height, width, alignment);
     let perceptual = |lpips: &Lpips| {
         let aligned = alignment.apply(prediction, target, height);
         let aligned: Vec<f32> = aligned.iter().map(|v| v.exp() as f32).collect();
@@ -124,18 +121,15 @@ fn score(
         lpips.distance(&srgb_q98(&aligned).0, &srgb_q98(&target).0, height, width)
     };
     let lpips = lpips.map(perceptual).transpose()?;
-    Ok(Scored { ldr_psnr: s.psnr_ldr, ssim: s.ssim_ldr, lpips, hdr_psnr: s.psnr_hdr })
+    Ok(Scored { scores: scores(prediction, target, height, width, alignment), lpips })
 }
 
 fn mean(each: &[Quality], part: impl Fn(&Quality) -> Scored) -> Scored {
-    let n = each.len() as f64;
-    let over = |f: &dyn Fn(&Scored) -> f64| each.iter().map(|q| f(&part(q))).sum::<f64>() / n;
-    let measured = !each.is_empty() && each.iter().all(|q| part(q).lpips.is_some());
+    let parts: Vec<_> = each.iter().map(part).collect();
+    let lpips = parts.iter().map(|p| p.lpips).collect::<Option<Vec<_>>>().filter(|all| !all.is_empty());
     Scored {
-        ldr_psnr: over(&|s| s.ldr_psnr),
-        ssim: over(&|s| s.ssim),
-        lpips: measured.then(|| over(&|s| s.lpips.unwrap_or(f64::NAN))),
-        hdr_psnr: over(&|s| s.hdr_psnr),
+        scores: Scores::mean(parts.iter().map(|p| &p.scores)),
+        lpips: lpips.map(|all| all.iter().sum::<f64>() / all.len() as f64),
     }
 }
 
@@ -154,7 +148,8 @@ impl Quality {
     pub(super) fn cells(&self) -> Vec<Cell> {
         let cells = |s: &Scored| {
             let lpips = s.lpips.map_or_else(|| Cell::missing("no weights"), |v| Cell::Number(v, 3));
-            [Cell::Number(s.ldr_psnr, 2), Cell::Number(s.ssim, 3), lpips, Cell::Number(s.hdr_psnr, 2)]
+            let Scores { ldr_psnr, ssim, hdr_psnr, .. } = s.scores;
+            [Cell::Number(ldr_psnr, 2), Cell::Number(ssim, 3), lpips, Cell::Number(hdr_psnr, 2)]
         };
         let sun = self.sun.map_or_else(|| Cell::missing("no sun"), |v| Cell::Number(v, 1));
         [cells(&self.reference), cells(&self.exposure)].into_iter().flatten().chain([sun]).collect()

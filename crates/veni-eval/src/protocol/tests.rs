@@ -381,7 +381,7 @@ fn the_optimised_pass_never_scores_below_the_encoders() {
         let codes = [&first as &dyn Codec, &second].map(|codec| codec.encode(GRID, image).unwrap());
         let [before, after] = codes.each_ref().map(|code| {
             let decoded = first.decode(GRID, code).unwrap();
-            scores(&decoded, image, GRID.height, GRID.width, Alignment::Exposure).psnr_ldr
+            scores(&decoded, image, GRID.height, GRID.width, Alignment::Exposure).ldr_psnr
         });
         assert!(after >= before, "{}: {before} became {after}", item.name());
         if codes[0] == codes[1] { kept += 1 } else { moved += 1 }

@@ -30,8 +30,9 @@ impl NormalMap {
         Ok(Self { width, height, normals })
     }
 
-    /// Reads an EXR or Radiance file, whose R, G, B are x, y, z as they stand, or a PNG, which holds 127.5 (n + 1)
-    /// per byte (32767.5 (n + 1) in 16 bits); black and transparent pixels of a PNG show nothing.
+    /// Reads an EXR or Radiance file, whose R, G, B are x, y, z as they stand, or a PNG (JPEG and WebP too, with
+    /// their losses), which holds 127.5 (n + 1) per byte (32767.5 (n + 1) in 16 bits); its black and transparent pixels show
+    /// nothing.
     ///
     /// # Errors
     /// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is not such an image.

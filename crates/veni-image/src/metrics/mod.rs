@@ -20,28 +20,33 @@ use serde::Serialize;
 
 use crate::tonemap::srgb_q98;
 
-/// How close a prediction is to its target. Higher is better throughout.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// How close a prediction is to its target, or the mean of that over a set. Higher is better throughout.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Scores {
-    /// Peak signal-to-noise ratio of radiance, dB; the peak is the target's range.
-    pub psnr_hdr: f64,
-    /// The same of display values.
-    pub psnr_ldr: f64,
-    /// Structural similarity of radiance.
-    pub ssim_hdr: f64,
+    /// Peak signal-to-noise ratio of display values, dB.
+    pub ldr_psnr: f64,
+    /// The same of radiance; the peak is the target's range.
+    pub hdr_psnr: f64,
     /// Structural similarity of display values.
-    pub ssim_ldr: f64,
+    pub ssim: f64,
+    /// Structural similarity of radiance; no table or record shows it.
+    #[serde(skip)]
+    pub hdr_ssim: f64,
 }
 
-/// Scores of one panorama or their mean over a set.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct MeanScores {
-    /// Peak signal-to-noise ratio of the display values, dB.
-    pub ldr_psnr: f64,
-    /// Peak signal-to-noise ratio of linear radiance, dB.
-    pub hdr_psnr: f64,
-    /// Structural similarity of the display values.
-    pub ssim: f64,
+impl Scores {
+    /// The mean of each score; NaN of none.
+    pub fn mean<'a>(each: impl IntoIterator<Item = &'a Self, IntoIter: Clone>) -> Self {
+        let each = each.into_iter();
+        let count = each.clone().count() as f64;
+        let mean = |score: fn(&Self) -> f64| each.clone().map(score).sum::<f64>() / count;
+        Self {
+            ldr_psnr: mean(|s| s.ldr_psnr),
+            hdr_psnr: mean(|s| s.hdr_psnr),
+            ssim: mean(|s| s.ssim),
+            hdr_ssim: mean(|s| s.hdr_ssim),
+        }
+    }
 }
 
 /// Compares two images of log radiance, `[height, width, 3]`.
@@ -68,10 +73,10 @@ pub fn scores(
     };
     let (p_ldr, i_ldr) = (display(&p), display(&i));
     Scores {
-        psnr_hdr: psnr(&p, &i),
-        psnr_ldr: psnr(&p_ldr, &i_ldr),
-        ssim_hdr: ssim(&p, &i, shape),
-        ssim_ldr: ssim(&p_ldr, &i_ldr, shape),
+        hdr_psnr: psnr(&p, &i),
+        ldr_psnr: psnr(&p_ldr, &i_ldr),
+        hdr_ssim: ssim(&p, &i, shape),
+        ssim: ssim(&p_ldr, &i_ldr, shape),
     }
 }
 

@@ -15,12 +15,12 @@ fn alignment_removes_what_it_says() {
     let brighter: Vec<f32> = target.iter().map(|v| v - 0.8).collect();
     let none = scores(&brighter, &target, H, W, Alignment::None);
     let exposure = scores(&brighter, &target, H, W, Alignment::Exposure);
-    assert!(none.psnr_hdr < 30.0 && exposure.psnr_hdr > 100.0, "{none:?} {exposure:?}");
+    assert!(none.hdr_psnr < 30.0 && exposure.hdr_psnr > 100.0, "{none:?} {exposure:?}");
     assert!((exposure_offset(&brighter, &target, H) - 0.8).abs() < 1e-6);
     let contrast: Vec<f32> = target.iter().map(|v| v * 0.5).collect();
     assert!((log_factor(&contrast, &target) - 2.0).abs() < 1e-6);
-    assert!(scores(&contrast, &target, H, W, Alignment::LogFactor).psnr_hdr > 100.0);
-    assert!(scores(&contrast, &target, H, W, Alignment::Exposure).psnr_hdr < 30.0);
+    assert!(scores(&contrast, &target, H, W, Alignment::LogFactor).hdr_psnr > 100.0);
+    assert!(scores(&contrast, &target, H, W, Alignment::Exposure).hdr_psnr < 30.0);
     assert_eq!(log_factor(&[0.0; 3], &[1.0; 3]), 1.0);
 }
 
@@ -41,9 +41,9 @@ fn scores_fall_with_the_error() {
     };
     let score = |amount: f32| scores(&noisy(amount), &target, H, W, Alignment::None);
     let (equal, near, far) = (score(0.0), score(0.1), score(0.5));
-    assert_eq!((equal.psnr_hdr, equal.ssim_ldr), (f64::INFINITY, 1.0));
-    assert!(near.psnr_hdr > far.psnr_hdr && near.psnr_ldr > far.psnr_ldr);
-    assert!(near.ssim_hdr > far.ssim_hdr && near.ssim_ldr > far.ssim_ldr && near.ssim_ldr < 1.0);
+    assert_eq!((equal.hdr_psnr, equal.ssim), (f64::INFINITY, 1.0));
+    assert!(near.hdr_psnr > far.hdr_psnr && near.ldr_psnr > far.ldr_psnr);
+    assert!(near.hdr_ssim > far.hdr_ssim && near.ssim > far.ssim && near.ssim < 1.0);
 }
 
 #[test]

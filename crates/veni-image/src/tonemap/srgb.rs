@@ -1,4 +1,4 @@
-//! The sRGB transfer function (IEC 61966-2-1) with the article's constants, its inverse and its derivatives.
+//! The sRGB transfer function (IEC 61966-2-1) with the paper's constants, its inverse and its derivatives.
 
 /// Up to here the curve is a line; also the slope of that line, and the power's scale, offset and exponent.
 const KNEE: f64 = 0.003_130_8;

@@ -66,11 +66,9 @@ impl Field {
         scratch: &mut Aligned,
     ) {
         let (mlp, folded, arch) = (&self.weights.mlp, &*self.folded, pulp::Arch::new());
-        if directions.len() <= FEW {
-            arch.dispatch(Single { mlp, folded, directions, out, log, scratch });
-        } else {
-            arch.dispatch(Blocks { mlp, folded, directions, out, log, scratch });
-        }
+        let few = directions.len() <= FEW;
+        let work = Blocks { mlp, folded, directions, out, log, scratch };
+        if few { arch.dispatch(Single(work)) } else { arch.dispatch(work) }
     }
 
     /// Linear RGB radiance of every pixel centre of `grid`, row-major from the top, on all cores.

@@ -5,33 +5,22 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::aligned::Aligned;
-use super::block::{EPSILON, PARTIAL, inner_product};
+use super::block::{Blocks, EPSILON, PARTIAL, inner_product};
 use super::mlp::{Matrix, Mlp, PANEL};
 use super::{Folded, math};
 
 /// Panels that run side by side: enough independent sums to hide the latency of multiply-add.
 const SIDE: usize = 8;
 
-/// Work for one thread: a few directions, one by one.
-pub(super) struct Single<'a> {
-    pub(super) mlp: &'a Mlp,
-    pub(super) folded: &'a Folded,
-    pub(super) directions: &'a [[f32; 3]],
-    /// As many as directions.
-    pub(super) out: &'a mut [[f32; 3]],
-    /// Log radiance instead of radiance.
-    pub(super) log: bool,
-    /// Workspace that the thread keeps.
-    pub(super) scratch: &'a mut Aligned,
-}
+/// The same work with a few directions, one by one.
+pub(super) struct Single<'a>(pub(super) Blocks<'a>);
 
 impl WithSimd for Single<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { mlp, folded, directions, out, log, scratch } = self;
+        let Self(Blocks { mlp, folded, directions, out, log, scratch }) = self;
         let (inputs, padded) = (5 * (folded.vectors.len() + 2), mlp.padded());
         let all = &mut scratch.at_least(inputs + 2 * padded)[..inputs + 2 * padded];
         // what is padding must be 0

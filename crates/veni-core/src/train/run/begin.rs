@@ -6,9 +6,10 @@ use std::io::Write;
 
 use super::*;
 use crate::train::init::{self, InitConfig};
-use veni_data::{PixelStorage, ProgressCallback};
+use veni_data::PixelStorage;
 use veni_light::model::Model;
 use veni_light::output::{Overwrite, existing_above, write_atomic};
+use veni_light::progress::{Observer, Silent};
 
 impl Trainer {
     /// Starts a run in `folder`, which must be free ([`is_free`]). `command` is recorded in the model file.
@@ -17,13 +18,13 @@ impl Trainer {
     /// [`Error::Invalid`] if the folder is in use or the configuration does not fit; what reading the data says.
     pub fn create(folder: &Path, config: TrainConfig, command: &str) -> Result<Self> {
         refuse_used(folder)?;
-        let trainer = Self::prepare(folder, config, command, &|_, _| {})?;
+        let trainer = Self::prepare(folder, config, command, &Silent)?;
         trainer.begin()?;
         Ok(trainer)
     }
 
     /// A run that is yet to [`begin`](Self::begin): its data and the weights that it starts from are read, nothing is
-    /// written. `progress` is called while the data is read.
+    /// written. `observer` is told how far reading the data has come.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the configuration does not fit; what reading data and weights says.
@@ -31,11 +32,11 @@ impl Trainer {
         folder: &Path,
         mut config: TrainConfig,
         command: &str,
-        progress: ProgressCallback<'_>,
+        observer: &dyn Observer,
     ) -> Result<Self> {
         config.check()?;
         let init = config.init.as_mut().map(InitConfig::open).transpose()?;
-        Self::fresh(folder, config, command, init.as_ref(), 0, progress)
+        Self::fresh(folder, config, command, init.as_ref(), 0, observer)
     }
 
     /// Makes the run's folder: from here on it can be continued.
@@ -68,7 +69,7 @@ impl Trainer {
     /// # Errors
     /// [`Error::Io`] or [`Error::Invalid`] if `config.toml` or the checkpoint cannot be read or do not fit together.
     pub fn resume(folder: &Path, command: &str) -> Result<Self> {
-        Self::resume_with(folder, command, &PixelStorage::default(), &|_, _| {})
+        Self::resume_with(folder, command, &PixelStorage::default(), &Silent)
     }
 
     /// [`Trainer::resume`], with panoramas kept as `storage` says (`config.toml` keeps what it says of that), reporting the
@@ -80,7 +81,7 @@ impl Trainer {
         folder: &Path,
         command: &str,
         storage: &PixelStorage,
-        progress: ProgressCallback<'_>,
+        observer: &dyn Observer,
     ) -> Result<Self> {
         let path = folder.join("config.toml");
         let text = fs::read_to_string(&path).map_err(|e| Error::io(&path, "read", e))?;
@@ -98,7 +99,7 @@ impl Trainer {
             )));
         }
         let done = state.as_ref().map_or(0, |(_, info)| info.step);
-        let mut trainer = Self::fresh(folder, config, command, None, done, progress)?;
+        let mut trainer = Self::fresh(folder, config, command, None, done, observer)?;
         trainer.make_folders()?;
         if let Some((state, info)) = state {
             trainer.optimiser.restore(state, info.step).map_err(|e| e.in_file(&path))?;
@@ -115,16 +116,16 @@ impl Trainer {
         command: &str,
         init: Option<&Model>,
         done: u64,
-        progress: ProgressCallback<'_>,
+        observer: &dyn Observer,
     ) -> Result<Self> {
         let opened = config.device.open_all(&config.devices)?;
         let devices: Vec<_> = opened.into_iter().map(|opened| opened.device.autodiff()).collect();
         config.decoder_backend.check()?;
         let scratch = existing_above(folder);
-        let splits = Splits::open_with_progress(&config.data, config.seed, scratch, progress)?;
+        let splits = Splits::open_observed(&config.data, config.seed, scratch, observer)?;
         let running = |stage: Stage| -> Result<Running> {
             let needed = stage.own_data && stage.end() > done;
-            let data = needed.then(|| own_data(&stage, &splits.val, scratch, progress)).transpose()?;
+            let data = needed.then(|| own_data(&stage, &splits.val, scratch, observer)).transpose()?;
             Ok(Running { stage, data })
         };
         let stages = config.stages()?.into_iter().map(running).collect::<Result<_>>()?;
@@ -162,12 +163,11 @@ fn refuse_used(folder: &Path) -> Result<()> {
 const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
 
 /// The training panoramas of a stage, without those that validate the run.
-fn own_data(stage: &Stage, val: &Dataset, scratch: &Path, progress: ProgressCallback<'_>) -> Result<Dataset> {
+fn own_data(stage: &Stage, val: &Dataset, scratch: &Path, observer: &dyn Observer) -> Result<Dataset> {
     let name = stage.name.as_deref().unwrap_or_default();
     let named = |e: Error| Error::invalid(format!("stage {name}: {}", e.with_source()));
-    let train = Splits::open_with_progress(&stage.config.data, stage.config.seed, scratch, progress)
-        .map_err(named)?
-        .train;
+    let train =
+        Splits::open_observed(&stage.config.data, stage.config.seed, scratch, observer).map_err(named)?.train;
     let file = |path: &Path| fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     let held_out: HashSet<_> = val.items().iter().map(|item| file(&item.path)).collect();
     let kept = train.retain(|item| !held_out.contains(&file(&item.path)));

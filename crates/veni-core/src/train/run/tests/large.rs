@@ -77,7 +77,8 @@ fn a_resumed_run_holds_its_panoramas_elsewhere_and_ends_with_the_same_weights() 
     let panorama = 12 * (width * height) as u64;
     for (memory_mib, mapped) in [(Some(100), 0), (None, 2 * panorama), (Some(0), (3 + 2) * panorama)] {
         let storage = PixelStorage { memory_mib, scratch: Some(scratch.clone()) };
-        let mut trainer = Trainer::resume_with(&moved, "test", &storage, &|_, _| {}).unwrap();
+        let mut trainer =
+            Trainer::resume_with(&moved, "test", &storage, &veni_light::progress::Silent).unwrap();
         assert_eq!(trainer.mapped_bytes(), mapped, "{memory_mib:?}");
         if memory_mib == Some(0) {
             complete(&mut trainer);

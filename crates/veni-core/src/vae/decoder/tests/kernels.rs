@@ -9,7 +9,7 @@ const SIZES: [[usize; 4]; 4] = [[16, 2, 4, 32], [20, 1, 3, 7], [64, 3, 30, 500],
 fn setup([hidden, layers, n, rays]: [usize; 4]) -> (Decoder, Tensor<3>, Tensor<3>) {
     let device = Device::flex().autodiff();
     let config = DecoderConfig { hidden, layers, heads: 2, ..DecoderConfig::default() };
-    let decoder = Decoder::new(&config, n, &mut Stream::from_seed(3), &device);
+    let decoder = Decoder::new(&config, n, &mut Stream::from_seed(4), &device);
     // away from 0 and 1, where a mistake in a norm's gain or offset would not show
     let mut all = weights::read(&decoder, "");
     for (name, weight) in &mut all {
@@ -84,7 +84,7 @@ fn kernels_give_the_values_and_gradients_of_tensor_operations() {
         let expected = by_tensors(&decoder, &latent, directions);
         let found = by_kernels(&decoder, &latent, flat.as_chunks().0, size[3]);
         for (name, difference) in differences(&expected, &found) {
-            assert!(difference < 5e-5, "{size:?}: {name} differs by {difference}");
+            assert!(difference < 3e-5, "{size:?}: {name} differs by {difference}");
         }
     }
 }
@@ -126,7 +126,7 @@ fn a_network_that_does_not_fold_is_refused_by_name() {
         heads: 2,
         ..DecoderConfig::default()
     };
-    let decoder = Decoder::new(&config, N, &mut Stream::from_seed(3), &device);
+    let decoder = Decoder::new(&config, N, &mut Stream::from_seed(4), &device);
     let error = decoder.native(latent(&device)).unwrap_err().to_string();
     assert!(error.contains("tokens"), "{error}");
 }

@@ -1,0 +1,20 @@
+//! Who is told how far long work has come. The libraries print nothing.
+
+/// Observer of progress. Work is reported from several threads.
+pub trait Observer: Sync {
+    /// `task` begins, which takes `total` units ("panorama"), `done` of them done by an earlier run.
+    fn begin(&self, unit: &'static str, task: &str, done: usize, total: usize);
+
+    /// This many more units of the task that began last are done.
+    fn advance(&self, units: usize);
+}
+
+/// Nobody observes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Observer for Silent {
+    fn begin(&self, _: &'static str, _: &str, _: usize, _: usize) {}
+
+    fn advance(&self, _: usize) {}
+}
