@@ -56,6 +56,14 @@ impl Panorama {
         &mut self.pixels
     }
 
+    /// The radiance alone, as the algorithms of [`veni_light::light`] take it.
+    ///
+    /// # Errors
+    /// [`veni_light::Error`] of kind `Invalid` if a value is negative or not finite; it names the pixel.
+    pub fn environment(&self) -> veni_light::Result<veni_light::light::EnvironmentMap<'_>> {
+        veni_light::light::EnvironmentMap::new(self.grid, &self.pixels)
+    }
+
     /// The pixels alone.
     pub fn into_pixels(self) -> Vec<[f32; 3]> {
         self.pixels

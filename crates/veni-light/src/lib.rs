@@ -7,6 +7,7 @@
 //! | [`latent`] | the code: N vectors in R³, and their prior |
 //! | [`model`] | the weight file, and the models inside this crate |
 //! | [`field`] | the decoder folded for one latent: radiance in any direction |
+//! | [`light`] | what renderers need of an environment map |
 //! | [`random`] | streams of random numbers that are the same on every machine |
 //! | [`cholesky`] | small dense systems of equations |
 //! | [`digest`] | content as one short name |
@@ -44,6 +45,7 @@ pub mod digest;
 pub mod error;
 pub mod field;
 pub mod latent;
+pub mod light;
 pub mod model;
 pub mod output;
 pub mod progress;

@@ -1,0 +1,7 @@
+//! What renderers need of an environment map: its lights, its harmonics, samples of it, prefiltered maps.
+//!
+//! Radiance is linear Rec. 709 in the units of the map; directions are of the [native frame](crate::sphere).
+
+mod environment;
+
+pub use environment::EnvironmentMap;
