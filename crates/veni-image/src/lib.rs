@@ -45,6 +45,6 @@ pub use read::{DEFAULT_MAX_PIXELS, LdrPanorama, ReadOptions, Transfer, attribute
 pub use sanitise::{Sanitised, log_reference, sanitise_values};
 pub use sheet::{Sheet, write_png};
 pub use write::{
-    HALF_RANGE, HalfRange, Precision, RADIANCE_SCALE, RowSink, WriteFormat, WriteOptions, half_error,
-    write_rows,
+    HALF_ERROR, HALF_RANGE, HalfRange, Precision, RADIANCE_SCALE, RowSink, WriteFormat, WriteOptions,
+    half_error, write_rows,
 };

@@ -34,8 +34,11 @@ pub(super) fn fit(pixels: &[[f32; 3]]) -> f32 {
     wanted.min(room).clamp(-126.0, 126.0).exp2() as f32
 }
 
+/// The largest [`half_error`] with which a panorama is worth keeping in half precision; ordinary ones have 2e-4.
+pub const HALF_ERROR: f64 = 1.0 / 1024.0;
+
 /// The mean relative error of half precision over the values of `pixels` times `factor`; zeros count as kept, what is too
-/// large as lost. Ordinary values have 2e-4.
+/// large as lost.
 pub fn half_error(pixels: &[[f32; 3]], factor: f32) -> f64 {
     let values = pixels.as_flattened();
     let error = |v: &f32| {

@@ -21,7 +21,7 @@ use veni_light::sphere::Equirect;
 /// half precision; [`Panorama::read`] divides by it again.
 pub const RADIANCE_SCALE: &str = "veni:radianceScale";
 
-pub use half_range::{HALF_RANGE, HalfRange, half_error};
+pub use half_range::{HALF_ERROR, HALF_RANGE, HalfRange, half_error};
 
 /// The `software` that written files name.
 const SOFTWARE: &str = concat!("veni ", env!("CARGO_PKG_VERSION"));
