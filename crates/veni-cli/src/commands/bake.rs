@@ -146,11 +146,7 @@ impl Bake {
                     *p = precision;
                 }
                 let attributes = attributes.clone();
-                let latlong = picture.is_latlong();
-                Ok((
-                    path.clone(),
-                    WriteOptions { attributes, overwrite, latlong, ..WriteOptions::new(format) },
-                ))
+                Ok((path.clone(), WriteOptions { attributes, overwrite, ..WriteOptions::new(format) }))
             };
             job.files.iter().map(file).collect()
         };

@@ -32,7 +32,7 @@ use store::{Settings, Store};
 #[derive(Args, Debug)]
 #[command(
     long_about = "Turn any folder of equirectangular panoramas into a training folder: \
-        train/, val/ (and test/) with half-float EXR files of one size, report.md, report.json and contact.png.\n\n\
+        train/, val/ (and test/) with EXR files of one size, report.md, report.json and contact.png.\n\n\
         Folders are searched to the bottom for OpenEXR and Radiance files and for PNG, JPEG, WebP and (feature avif) AVIF \
         images of any size. Those hold no more than a display's range: their clipped regions are found and the sun and other highlights rebuilt \
         (--expand). Every file is checked; what is broken, not twice as wide as high, too small, black, transparent or one grey \

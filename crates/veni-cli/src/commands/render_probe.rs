@@ -250,8 +250,7 @@ impl RenderProbe {
             *precision = Precision::Float;
         }
         let overwrite = Overwrite::from(self.force);
-        let options =
-            WriteOptions { attributes, overwrite, latlong: false, colour, ..WriteOptions::new(format) };
+        let options = WriteOptions { attributes, overwrite, colour, ..WriteOptions::new(format) };
         let size = Equirect::new(scene.surface.width(), scene.surface.height());
         Panorama::new(size, pixels).write(path, &options).map_err(with_remedy)
     }

@@ -8,8 +8,7 @@ use exr::block::writer::ChunksWriter;
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::math::Vec2;
 use exr::meta::attribute::{
-    AttributeValue, ChannelDescription, Chromaticities, Compression, EnvironmentMap, LineOrder, SampleType,
-    Text,
+    AttributeValue, ChannelDescription, Chromaticities, Compression, LineOrder, SampleType, Text,
 };
 use exr::meta::header::{Header, LayerAttributes};
 use exr::meta::{BlockDescription, MetaData};
@@ -139,11 +138,8 @@ fn header(grid: Equirect, precision: Precision, factor: f32, options: &WriteOpti
     let sample_type = if precision == Precision::Half { SampleType::F16 } else { SampleType::F32 };
     // alphabetical, as the format demands
     let channels = ["B", "G", "R"].map(|name| ChannelDescription::new(name, sample_type, false));
-    let mut attributes = LayerAttributes {
-        environment_map: options.latlong.then_some(EnvironmentMap::LatitudeLongitude),
-        software_name: Some(Text::from(SOFTWARE)),
-        ..LayerAttributes::default()
-    };
+    let mut attributes =
+        LayerAttributes { software_name: Some(Text::from(SOFTWARE)), ..LayerAttributes::default() };
     let room = |name: &str| if ["comments", "owner"].contains(&name) { usize::MAX } else { MAX_TEXT };
     for (name, value) in texts(options, factor, room)? {
         let value = text(&value)?;

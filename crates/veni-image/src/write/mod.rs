@@ -60,7 +60,8 @@ pub enum Precision {
 /// The format of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WriteFormat {
-    /// OpenEXR: scan lines in increasing order, ZIP, `envmap = latlong`, Rec. 709 chromaticities.
+    /// OpenEXR: scan lines in increasing order, ZIP, Rec. 709 chromaticities. There is no `envmap`: by `latlong` OpenEXR
+    /// means samples that lie on the edges of the image, ours are at the centres of pixels.
     Exr(Precision),
     /// Radiance RGBE with run-length coding: 8 significant bits, shared exponent.
     Hdr,
@@ -103,9 +104,6 @@ pub struct WriteOptions {
     pub attributes: BTreeMap<String, String>,
     /// Whether an existing file may be replaced.
     pub overwrite: Overwrite,
-    /// Whether the rows are a latitude–longitude panorama, as an EXR file then says; otherwise (cube faces, charts)
-    /// it says nothing about directions.
-    pub latlong: bool,
     /// Whether the values are colours (linear Rec. 709, as an EXR file then says); otherwise they are numbers of another
     /// kind, such as normals.
     pub colour: bool,
@@ -119,7 +117,6 @@ impl WriteOptions {
             half_range: HalfRange::Refuse,
             attributes: BTreeMap::new(),
             overwrite: Overwrite::Refuse,
-            latlong: true,
             colour: true,
         }
     }
