@@ -3,7 +3,6 @@
 use std::fs;
 
 use exr::meta::BlockDescription;
-use exr::meta::attribute::EnvironmentMap;
 use exr::prelude::*;
 
 use super::super::tonemap::Tonemap;
