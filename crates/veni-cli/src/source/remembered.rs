@@ -8,8 +8,9 @@ use clap::ValueEnum;
 use veni_image::{Panorama, Provenance, ReadOptions};
 use veni_light::latent::Latent;
 use veni_light::model::Model;
-use veni_light::sphere::{CubeFace, Equirect, Frame};
+use veni_light::sphere::{Equirect, Frame};
 
+use crate::device::Directions;
 use crate::output::{CUBE_FACES, FRAME, with_remedy};
 use crate::picture::FrameName;
 
@@ -34,10 +35,10 @@ pub(super) fn is_of_its_pixels(path: &Path, latent: &Latent, model: &Model) -> R
 
 fn is_decoded(image: &Panorama, latent: &Latent, model: &Model) -> Result<bool> {
     let grid = image.grid();
-    let Some(direction) = directions(image) else { return Ok(false) };
+    let Some(of) = directions(image) else { return Ok(false) };
     let step = grid.len().div_ceil(SAMPLES) | 1;
     let at: Vec<usize> = (0..grid.len()).step_by(step).collect();
-    let directions: Vec<_> = at.iter().map(|at| direction(at % grid.width, at / grid.width)).collect();
+    let directions: Vec<_> = at.iter().map(|at| of.at(at % grid.width, at / grid.width)).collect();
     let mut decoded = vec![[0.0; 3]; at.len()];
     model.decoder()?.condition(latent)?.radiance_batch(&directions, &mut decoded);
     Ok(at.iter().zip(&decoded).all(|(at, decoded)| is_near(image.pixels()[*at], *decoded)))
@@ -48,17 +49,13 @@ fn is_near(stored: [f32; 3], decoded: [f32; 3]) -> bool {
     stored.iter().zip(decoded).all(|(a, b)| (a - b).abs() <= allowed)
 }
 
-/// The direction of a pixel of a panorama, or of a cube map; `None` for another shape.
-fn directions(image: &Panorama) -> Option<Box<dyn Fn(usize, usize) -> [f32; 3]>> {
+/// Those of a panorama, or of a cube map; `None` for another shape.
+fn directions(image: &Panorama) -> Option<Directions> {
     let grid @ Equirect { width, height } = image.grid();
     if !image.attributes().contains_key(CUBE_FACES) {
-        return (width == 2 * height)
-            .then(|| Box::new(move |i, j| grid.direction(i, j)) as Box<dyn Fn(usize, usize) -> [f32; 3]>);
+        return (width == 2 * height).then_some(Directions::Equirect(grid));
     }
     let name = image.attributes().get(FRAME)?;
     let frame = Frame::from(<FrameName as ValueEnum>::from_str(name, true).ok()?);
-    (height == 6 * width).then(|| {
-        let at = move |i: usize, j: usize| CubeFace::ALL[j / width].direction(frame, width, i, j % width);
-        Box::new(at) as Box<dyn Fn(usize, usize) -> [f32; 3]>
-    })
+    (height == 6 * width).then_some(Directions::Cube { edge: width, frame })
 }
