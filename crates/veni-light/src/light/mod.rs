@@ -2,6 +2,8 @@
 //!
 //! Radiance is linear Rec. 709 in the units of the map; directions are of the [native frame](crate::sphere).
 
+mod compact;
 mod environment;
 
+pub use compact::{CompactLight, Kind, RadiusSource};
 pub use environment::EnvironmentMap;
