@@ -53,6 +53,7 @@ pub(crate) enum Command {
     Fit(commands::fit::Fit),
     Prepare(commands::prepare::Prepare),
     RenderProbe(commands::render_probe::RenderProbe),
+    Light(commands::light::Light),
     #[cfg(feature = "learn")]
     Evaluate(commands::evaluate::Evaluate),
     Inspect(commands::inspect::Inspect),
@@ -74,6 +75,7 @@ impl Command {
             Self::Fit(c) => c.run(report),
             Self::Prepare(c) => c.run(report),
             Self::RenderProbe(c) => c.run(report),
+            Self::Light(c) => c.run(report),
             #[cfg(feature = "learn")]
             Self::Evaluate(c) => c.run(report),
             Self::Inspect(c) => c.run(report),

@@ -22,6 +22,14 @@ fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     }
 }
 
+/// More than 0.
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
+    match finite(text)? {
+        v if v > 0.0 => Ok(v),
+        v => Err(format!("{v} is not more than 0")),
+    }
+}
+
 /// 0 to 1.
 pub(crate) fn fraction(text: &str) -> Result<f32, String> {
     Ok(within(text, 0.0, 1.0)? as f32)

@@ -26,7 +26,7 @@ mod math;
 mod mlp;
 mod rate;
 mod single;
-mod tasks;
+pub(crate) mod tasks;
 mod weights;
 
 use std::sync::Arc;

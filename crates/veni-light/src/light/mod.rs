@@ -1,7 +1,31 @@
 //! What renderers need of an environment map: its lights, its harmonics, samples of it, prefiltered maps.
 //!
-//! Radiance is linear Rec. 709 in the units of the map; directions are of the [native frame](crate::sphere).
+//! Radiance is linear Rec. 709 in the units of the map; directions are of the [native frame](crate::sphere). Equations and the
+//! conventions of engines are in docs/LIGHT.md.
+//!
+//! | here | what |
+//! |---|---|
+//! | [`EnvironmentMap`] | radiance of all directions, borrowed |
+//! | [`Light`], [`LightOptions`] | a map split into compact lights, the sun first, and the rest |
+//! | [`CompactLight`], [`Disc`] | one light, and its exact place on pixels |
+//! | [`sh`] | spherical harmonics |
 
+mod compact;
+mod disc;
 mod environment;
+mod extract;
+mod lit;
+mod luminance;
+pub mod sh;
+mod turn;
 
+pub use compact::{CompactLight, Kind, RadiusSource};
+pub use disc::Disc;
 pub use environment::EnvironmentMap;
+pub use extract::SunChoice;
+pub use lit::{Light, LightOptions};
+pub use luminance::{LUMINANCE, luminance};
+pub use sh::Sh;
+
+#[cfg(test)]
+mod tests;
