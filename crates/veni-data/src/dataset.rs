@@ -7,8 +7,8 @@ use std::sync::Arc;
 use crate::parallel::parallel;
 use crate::pixels::Pixels;
 use crate::{Error, Result};
-use veni_image::{Budget, Panorama, ReadOptions};
 use veni_image::exposure::centre_exposure;
+use veni_image::{Budget, Panorama, ReadOptions};
 use veni_light::progress::{Observer, Silent};
 use veni_light::sphere::Equirect;
 

@@ -76,7 +76,10 @@ mod tests {
         std::fs::write(&path, "12345").unwrap();
         assert_eq!(read_text(&path, "a note", 5).unwrap(), "12345");
         let error = read_text(&path, "a note", 4).unwrap_err();
-        assert!(matches!(&error, Error::TooLarge(m) if m.contains("a.txt: not a note (larger than 4")), "{error}");
+        assert!(
+            matches!(&error, Error::TooLarge(m) if m.contains("a.txt: not a note (larger than 4")),
+            "{error}"
+        );
         std::fs::write(&path, [0xFF]).unwrap();
         assert!(read_text(&path, "a note", 5).unwrap_err().to_string().contains("no text"));
         assert!(matches!(read_file(&folder.path().join("none"), "a note", 5), Err(Error::Io { .. })));

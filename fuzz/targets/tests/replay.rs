@@ -1,0 +1,72 @@
+//! The corpus and some thousand mutations of each target, on any toolchain: nothing panics, not even where it would be caught;
+//! nothing hangs; memory stays within what is declared.
+//!
+//! One test, because panics and the process's memory are everybody's.
+
+use std::time::{Duration, Instant};
+
+use veni_fuzz_targets::mutate::Mutator;
+use veni_fuzz_targets::watch::{Clock, LONGEST, Tally, watch};
+use veni_fuzz_targets::{PIXELS, Target, corpus, targets};
+
+/// Mutations of each target, and the time after which a slow machine runs fewer.
+const MUTATIONS: usize = 2000;
+const SECONDS: f64 = 1.2;
+/// Memory of the process: 1 GiB and 32 bytes for each pixel that may be declared.
+const MEMORY: u64 = (1 << 30) + 32 * PIXELS as u64;
+
+fn replay(target: &Target) -> Tally {
+    let (clock, mut tally) = (Clock::start(target.name), Tally::default());
+    let seeds = (target.seeds)();
+    assert!(!seeds.is_empty(), "{}", target.name);
+    let inputs: Vec<_> =
+        seeds.into_iter().chain(corpus(target.name).into_iter().map(|(_, data)| data)).collect();
+    inputs.iter().for_each(|data| tally.run(target, data, Some(&clock), None));
+    let (mut mutator, begin) = (Mutator::new(20, inputs), Instant::now());
+    for _ in 0..MUTATIONS {
+        if begin.elapsed() > Duration::from_secs_f64(SECONDS) {
+            break;
+        }
+        let mut data = mutator.next();
+        (target.repair)(&mut data);
+        tally.run(target, &data, Some(&clock), None);
+    }
+    tally
+}
+
+#[test]
+fn nothing_panics_hangs_or_fills_the_memory() {
+    watch();
+    // the check must be able to fail: a panic is noted though it is caught
+    let broken = Target { name: "broken", run: |_| panic!("on purpose"), ..targets()[0] };
+    let mut tally = Tally::default();
+    tally.run(&broken, b"x", None, None);
+    assert_eq!(tally.crashes.len(), 1);
+    assert!(tally.crashes[0].1.contains("on purpose"), "{tally:?}");
+    // as the program does with a damaged EXR file
+    let caught = Target { run: |_| std::panic::catch_unwind(|| panic!("unseen")).is_ok(), ..broken };
+    tally.run(&caught, b"x", None, None);
+    assert_eq!(tally.crashes.len(), 2);
+
+    let mut wrong = Vec::new();
+    for target in targets() {
+        let tally = replay(&target);
+        assert!(tally.inputs > 20, "{}: only {} inputs", target.name, tally.inputs);
+        wrong.extend(tally.crashes.iter().take(3).map(|(_, place)| format!("{}: {place}", target.name)));
+        if tally.slowest > LONGEST || tally.largest > MEMORY {
+            wrong.push(format!("{}: {:?}, {} MiB", target.name, tally.slowest, tally.largest >> 20));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// What is to be mutated must be what is read: a seed that is refused tests only the refusal.
+#[test]
+fn seeds_are_read() {
+    for target in targets() {
+        for (k, seed) in (target.seeds)().into_iter().enumerate() {
+            let path = veni_fuzz_targets::on_disk(&seed);
+            assert!((target.run)(&path), "{}: seed {k} is refused", target.name);
+        }
+    }
+}
