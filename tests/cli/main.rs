@@ -26,6 +26,7 @@ mod gpu;
 mod inspect;
 #[cfg(feature = "learn")]
 mod large_sets;
+mod limits;
 #[cfg(feature = "onnx")]
 #[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-data's tests use the rest of it")]

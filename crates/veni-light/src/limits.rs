@@ -29,6 +29,12 @@ pub const MAX_ENCODER_SAMPLES: u64 = 1 << 20;
 /// configuration alone: a file of a few kB can ask for any.
 pub const MAX_ENCODER_NUMBERS: u64 = 1 << 27;
 
+/// Condition features of a latent, N · (N + 1) where they are inner products: the paper's 100 vectors have 50,500.
+pub const MAX_CONDITION_FEATURES: u64 = 1 << 22;
+
+/// Numbers of one ray's tokens, N × hidden features: the paper's 100 vectors have 12,800. A ray looks at all of them.
+pub const MAX_TOKEN_NUMBERS: u64 = 1 << 20;
+
 /// Refuses `value` beyond `limit`; `what` names it with its unit.
 ///
 /// # Errors

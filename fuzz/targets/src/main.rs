@@ -1,48 +1,85 @@
-//! `fuzz-stable TARGET SECONDS [SEED] [FOLDER]`: mutates the seeds and the corpus of a target for so long, on any toolchain,
-//! and prints one JSON object. `fuzz-stable` alone prints the names of the targets. Inputs that panic are kept in FOLDER;
-//! one that takes longer than 10 s, or ends the process in another way, is left in the folder of the input.
+//! Mutates the seeds and the corpus of a target on any toolchain; the same inputs every time.
+//!
+//! - `fuzz-stable`: prints the names of the targets
+//! - `fuzz-stable TARGET SECONDS [SEED] [FOLDER]`: runs one and prints one JSON object. Inputs that panic are kept in FOLDER;
+//!   one that takes longer than 10 s, or ends the process in another way, is left in the folder of the input
+//! - `fuzz-stable --seeds FOLDER`: writes seeds and corpus of every target to FOLDER/TARGET
+//! - `fuzz-stable --table`: the JSON objects of standard input as a table
 #![allow(clippy::print_stdout, reason = "a command's result")]
 
-use std::path::PathBuf;
+use std::io::BufRead;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
 use veni_fuzz_targets::mutate::Mutator;
 use veni_fuzz_targets::watch::{Clock, Tally, watch};
-use veni_fuzz_targets::{corpus, target, targets};
+use veni_fuzz_targets::{Target, corpus, target, targets};
 
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let Some(name) = args.first() else {
-        targets().iter().for_each(|target| println!("{}", target.name));
-        return;
-    };
-    let number = |at: usize| args.get(at).map_or(1, |text| text.parse::<u64>().expect("a whole number"));
-    let (seconds, seed, keep) = (number(1), number(2), args.get(3).map(PathBuf::from));
-    let target = target(name);
+    match args.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] => targets().iter().for_each(|target| println!("{}", target.name)),
+        ["--table"] => table(),
+        ["--seeds", folder] => write_seeds(Path::new(folder)),
+        [name, ref rest @ ..] => {
+            let number = |at: usize| rest.get(at).map_or(1, |text| text.parse().expect("a whole number"));
+            println!("{}", fuzz(&target(name), number(0), number(1), rest.get(2).map(PathBuf::from)));
+        }
+    }
+}
+
+fn inputs(target: &Target) -> Vec<Vec<u8>> {
+    (target.seeds)().into_iter().chain(corpus(target.name).into_iter().map(|(_, data)| data)).collect()
+}
+
+fn fuzz(target: &Target, seconds: u64, seed: u64, keep: Option<PathBuf>) -> Value {
     let (clock, mut tally) = (Clock::start(target.name), Tally::default());
     watch();
-    let inputs: Vec<_> =
-        (target.seeds)().into_iter().chain(corpus(name).into_iter().map(|(_, data)| data)).collect();
+    let inputs = inputs(target);
     let end = Instant::now() + Duration::from_secs(seconds);
-    inputs.iter().for_each(|data| tally.run(&target, data, Some(&clock), keep.as_deref()));
+    inputs.iter().for_each(|data| tally.run(target, data, Some(&clock), keep.as_deref()));
     let mut mutator = Mutator::new(seed, inputs);
     while Instant::now() < end {
         let mut data = mutator.next();
         (target.repair)(&mut data);
-        tally.run(&target, &data, Some(&clock), keep.as_deref());
+        tally.run(target, &data, Some(&clock), keep.as_deref());
     }
     let mut places: Vec<_> = tally.crashes.iter().map(|(_, place)| place.clone()).collect();
     places.sort();
     places.dedup();
-    println!(
-        "{}",
-        serde_json::json!({
-            "target": name,
-            "inputs": tally.inputs,
-            "crashes": tally.crashes.len(),
-            "places": places,
-            "memory_mib": tally.largest >> 20,
-            "slowest_ms": tally.slowest.as_millis() as u64,
-        })
-    );
+    serde_json::json!({
+        "target": target.name,
+        "by": "mutations",
+        "seconds": seconds,
+        "inputs": tally.inputs,
+        "crashes": tally.crashes.len(),
+        "places": places,
+        "memory_mib": tally.largest >> 20,
+        "slowest_ms": tally.slowest.as_millis() as u64,
+    })
+}
+
+fn write_seeds(folder: &Path) {
+    for target in targets() {
+        let own = folder.join(target.name);
+        std::fs::create_dir_all(&own).expect("a folder");
+        for (k, data) in inputs(&target).into_iter().enumerate() {
+            std::fs::write(own.join(format!("seed-{k:03}")), data).expect("a seed");
+        }
+    }
+}
+
+fn table() {
+    println!("| target | by | seconds | inputs | crashes | memory, MiB | slowest, ms |");
+    println!("|---|---|--:|--:|--:|--:|--:|");
+    let mut total = 0;
+    for line in std::io::stdin().lock().lines() {
+        let value: Value = serde_json::from_str(&line.expect("text")).expect("a JSON object");
+        let cell = |key: &str| value[key].as_str().map_or_else(|| value[key].to_string(), str::to_owned);
+        total += value["inputs"].as_u64().unwrap_or(0);
+        let cells = ["target", "by", "seconds", "inputs", "crashes", "memory_mib", "slowest_ms"].map(cell);
+        println!("| {} |", cells.join(" | "));
+    }
+    println!("\n{total} inputs in all.");
 }

@@ -15,7 +15,7 @@ fn mesh(path: &Path) -> bool {
 }
 
 fn meshes() -> Vec<Vec<u8>> {
-    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0 # corner\nv 0 1 0\nf 1 2 3 4\n";
+    let square = "v 0 0 0\nv 1 0 0\n# a comment\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
     let normals = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 1\nvn 0 0 1\nvt 0 0\nf 1/1/1 2/1/1 -1/1/1\n";
     vec![square.into(), normals.into()]
 }

@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::DecoderConfig;
-use crate::limits::{MAX_ENCODER_NUMBERS, MAX_ENCODER_SAMPLES, at_most};
+use super::{Conditioning, DecoderConfig};
+use crate::limits::{
+    MAX_CONDITION_FEATURES, MAX_ENCODER_NUMBERS, MAX_ENCODER_SAMPLES, MAX_TOKEN_NUMBERS, at_most,
+};
 use crate::sphere::StripeSampling;
 use crate::{Error, Result};
 
@@ -38,6 +40,12 @@ impl ModelConfig {
     pub fn validate(&self) -> Result<()> {
         within("latent_vectors", self.latent_vectors, 4096)?;
         self.decoder.validate()?;
+        let features = self.decoder.condition_inputs(self.latent_vectors) as u64;
+        at_most("condition features", features, MAX_CONDITION_FEATURES)?;
+        if self.decoder.conditioning == Conditioning::Tokens {
+            let numbers = self.latent_vectors as u64 * self.decoder.hidden as u64;
+            at_most("numbers of a ray's tokens", numbers, MAX_TOKEN_NUMBERS)?;
+        }
         let Some(encoder) = &self.encoder else { return Ok(()) };
         within("encoder.stripes", encoder.stripes, 1 << 16)?;
         within("encoder.samples", encoder.samples.unwrap_or(1), 1 << 20)?;
@@ -213,6 +221,29 @@ mod tests {
             (|e| (e.stripes, e.samples) = (1 << 16, None), "samples"),
         ] {
             let error = with(change).unwrap_err();
+            assert!(matches!(&error, Error::TooLarge(m) if m.contains(what)), "{error}");
+        }
+    }
+
+    #[test]
+    fn decoders_that_would_fill_the_memory_are_refused_by_their_configuration() {
+        use crate::model::Invariance;
+        let with = |vectors, change: fn(&mut DecoderConfig)| {
+            let mut config = ModelConfig::decode_only(vectors);
+            change(&mut config.decoder);
+            config.validate()
+        };
+        with(300, |d| (d.conditioning, d.invariance) = (Conditioning::Tokens, Invariance::GramMatrix))
+            .unwrap();
+        for (vectors, change, what) in [
+            (
+                4096,
+                (|d| d.invariance = Invariance::GramMatrix) as fn(&mut DecoderConfig),
+                "condition features",
+            ),
+            (4096, |d| (d.conditioning, d.hidden) = (Conditioning::Tokens, 512), "tokens"),
+        ] {
+            let error = with(vectors, change).unwrap_err();
             assert!(matches!(&error, Error::TooLarge(m) if m.contains(what)), "{error}");
         }
     }
