@@ -10,20 +10,20 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 seconds=${1:?"seconds for each target"}
 shift
-json=0 stable=0 learn=()
+json=0 stable=0 features=avif,onnx learn=()
 chosen=()
 for argument; do
     case $argument in
         --json) json=1 ;;
         --stable) stable=1 ;;
-        --learn) learn=(--features learn) ;;
+        --learn) features+=,learn learn=(--features learn) ;;
         *) chosen+=("$argument") ;;
     esac
 done
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 work=$target/fuzz
 mkdir -p "$work/artifacts"
-cargo build --release --quiet -p veni-fuzz-targets "${learn[@]}" >&2
+cargo build --release --quiet -p veni-fuzz-targets --features "$features" >&2
 runner=$target/release/fuzz-stable
 ((${#chosen[@]})) || mapfile -t chosen < <("$runner")
 nightly=nightly

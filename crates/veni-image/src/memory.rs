@@ -11,7 +11,8 @@ const SMALL: u64 = 256 << 20;
 /// # Errors
 /// [`Error::TooLarge`] with both numbers if `bytes` are more than [`available`].
 pub fn check(bytes: u64) -> Result<()> {
-    match available().filter(|left| bytes > SMALL && bytes > *left) {
+    let left = if bytes > SMALL { available() } else { None };
+    match left.filter(|left| bytes > *left) {
         None => Ok(()),
         Some(left) => Err(Error::too_large(format!(
             "its pixels need {} MiB of memory, and {} MiB are available: make it smaller",

@@ -68,7 +68,39 @@ fn written(name: &str, format: WriteFormat) -> Vec<u8> {
 }
 
 fn exr() -> Vec<Vec<u8>> {
-    [Precision::Half, Precision::Float].map(|p| written("a.exr", WriteFormat::Exr(p))).to_vec()
+    let mut all = [Precision::Half, Precision::Float].map(|p| written("a.exr", WriteFormat::Exr(p))).to_vec();
+    all.extend(foreign());
+    all
+}
+
+/// Every compression, in scan lines and in tiles, by the library that others use too.
+fn foreign() -> Vec<Vec<u8>> {
+    use exr::prelude::*;
+    let compressions = [
+        Compression::Uncompressed,
+        Compression::RLE,
+        Compression::ZIP1,
+        Compression::ZIP16,
+        Compression::PIZ,
+        Compression::PXR24,
+        Compression::B44,
+        Compression::B44A,
+        Compression::DWAA(None),
+    ];
+    let blocks = [Blocks::ScanLines, Blocks::Tiles(Vec2(8, 8))];
+    let pairs = compressions.into_iter().flat_map(|c| blocks.map(|b| (c, b)));
+    let one = |(compression, blocks)| {
+        let half = |v: f32| f16::from_f32(v);
+        let channels = SpecificChannels::rgb(move |at: Vec2<usize>| {
+            (half(at.x() as f32), half(at.y() as f32), half(0.5))
+        });
+        let encoding = Encoding { compression, blocks, line_order: LineOrder::Increasing };
+        let layer = Layer::new((16, 8), LayerAttributes::default(), encoding, channels);
+        let mut out = Cursor::new(Vec::new());
+        Image::from_layer(layer).write().to_buffered(&mut out).ok()?;
+        Some(out.into_inner())
+    };
+    pairs.filter_map(one).collect()
 }
 
 fn hdr() -> Vec<Vec<u8>> {

@@ -12,8 +12,8 @@ use veni_fuzz_targets::{PIXELS, Target, corpus, on_disk, targets};
 /// Mutations of each target, and the time after which a slow machine runs fewer.
 const MUTATIONS: usize = 2000;
 const SECONDS: f64 = 1.2;
-/// Memory of the process: 1 GiB and 32 bytes for each pixel that may be declared.
-const MEMORY: u64 = (1 << 30) + 32 * PIXELS as u64;
+/// Memory of the process: 1 GiB and what the pixels that may be declared take.
+const MEMORY: u64 = (1 << 30) + veni_image::limits::READ_BYTES_PER_PIXEL * PIXELS as u64;
 
 fn replay(target: &Target) -> Tally {
     let (clock, mut tally) = (Clock::start(target.name), Tally::default());

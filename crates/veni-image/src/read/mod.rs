@@ -11,11 +11,12 @@ mod precheck;
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
 use image::ImageFormat;
 
+use crate::limits::{EXAMINE_BYTES_PER_PIXEL, READ_BYTES_PER_PIXEL};
 use crate::panorama::Panorama;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
@@ -137,19 +138,25 @@ pub fn attributes(path: impl AsRef<Path>) -> Result<BTreeMap<String, String>> {
     read().map_err(|e| e.in_file(path))
 }
 
-/// Bytes of memory that reading and examining a file takes at its peak, by the size that its header declares; no pixel is
-/// read. Nothing where it declares none, or more pixels than `options` allow: to read it is an error.
+/// Bytes of memory that reading, expanding and examining a file takes at its peak, by the size that its header declares; no
+/// pixel is read. Nothing where it declares none, or more pixels than `options` allow: to read it is an error.
 ///
 /// # Errors
 /// As [`Panorama::read_with`] and [`LdrPanorama::read_with`] where the header is concerned.
 pub fn peak_bytes(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Option<u64>> {
     let path = path.as_ref();
-    let look = || Ok(precheck::peak(declared(&mut open(path)?, path)?, options));
+    let look = || {
+        let mut file = open(path)?;
+        let start = first_bytes(&mut file, path)?;
+        // radiance is not expanded
+        let each = if ldr::format(&start).is_some() { EXAMINE_BYTES_PER_PIXEL } else { READ_BYTES_PER_PIXEL };
+        Ok(precheck::peak(declared(&mut file, path)?, each, options))
+    };
     look().map_err(|e: Error| e.in_file(path))
 }
 
 /// The size that the header of a file of any format declares; rewinds.
-fn declared(file: &mut (impl Read + Seek), path: &Path) -> Result<precheck::Size> {
+fn declared(file: &mut (impl BufRead + Seek), path: &Path) -> Result<precheck::Size> {
     let start = first_bytes(file, path)?;
     let Some((format, _)) = ldr::format(&start) else {
         return match kind(file, path)? {

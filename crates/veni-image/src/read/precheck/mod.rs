@@ -9,13 +9,13 @@ mod jpeg;
 mod png;
 mod webp;
 
-use std::io::{Read, Result as IoResult, Seek, SeekFrom};
+use std::io::{BufRead, Read, Result as IoResult, Seek, SeekFrom};
 use std::path::Path;
 
 use image::ImageFormat;
 
 use super::ReadOptions;
-use crate::limits::{BYTES_PER_FILE, BYTES_PER_PIXEL, MAX_FILE_BYTES, at_most};
+use crate::limits::{BYTES_PER_FILE, MAX_FILE_BYTES, READ_BYTES_PER_PIXEL, at_most};
 use crate::{Error, Result, memory};
 
 pub(super) use self::exr::check as exr;
@@ -28,7 +28,7 @@ pub(super) type Size = Option<[u64; 2]>;
 ///
 /// # Errors
 /// [`Error::TooLarge`] beyond a limit of [`crate::limits`], [`Error::Invalid`] for what makes a decoder panic.
-pub(super) fn ldr(file: &mut (impl Read + Seek), path: &Path, format: ImageFormat) -> Result<Size> {
+pub(super) fn ldr(file: &mut (impl BufRead + Seek), path: &Path, format: ImageFormat) -> Result<Size> {
     let io = |e| Error::io(path, "read", e);
     let length = length(file).map_err(io)?;
     at_most("bytes of file", length, MAX_FILE_BYTES)?;
@@ -42,18 +42,18 @@ pub(super) fn ldr(file: &mut (impl Read + Seek), path: &Path, format: ImageForma
     size
 }
 
-/// Bytes that reading and examining a file takes at its peak, by the size that its header declares; nothing where no
-/// size is found, or where it is beyond what `options` allow: such a file is refused before its pixels are allocated.
-pub(super) fn peak(size: Size, options: &ReadOptions) -> Option<u64> {
+/// Bytes that work on a file takes at its peak, by the size that its header declares and the bytes for each pixel; nothing
+/// where no size is found, or where it is beyond what `options` allow: such a file is refused before its pixels are allocated.
+pub(super) fn peak(size: Size, each: u64, options: &ReadOptions) -> Option<u64> {
     let [width, height] = size?;
     let pixels = width.checked_mul(height).filter(|n| *n <= options.max_pixels as u64)?;
-    Some(BYTES_PER_FILE + pixels * BYTES_PER_PIXEL)
+    Some(BYTES_PER_FILE + pixels * each)
 }
 
 /// # Errors
 /// [`Error::TooLarge`] if the memory does not hold what reading a file of this size takes.
 pub(super) fn room(size: Size, options: &ReadOptions) -> Result<()> {
-    peak(size, options).map_or(Ok(()), memory::check)
+    peak(size, READ_BYTES_PER_PIXEL, options).map_or(Ok(()), memory::check)
 }
 
 fn length(file: &mut impl Seek) -> IoResult<u64> {

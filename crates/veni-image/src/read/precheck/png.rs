@@ -3,7 +3,7 @@
 //! The decoder panics on a palette whose length is not a multiple of three or beyond 256 entries, and inflates a colour
 //! profile in one piece (docs/UPSTREAM.md).
 
-use std::io::{Read, Seek};
+use std::io::{BufRead, Read, Seek};
 use std::path::Path;
 
 use miniz_oxide::inflate::stream::{InflateState, inflate};
@@ -16,10 +16,21 @@ use crate::{Error, Result};
 /// Colour type of images with a palette.
 const INDEXED: u8 = 3;
 
-pub(super) fn check(file: &mut (impl Read + Seek), path: &Path) -> Result<Size> {
+pub(super) fn check(file: &mut (impl BufRead + Seek), path: &Path) -> Result<Size> {
+    let (size, entries, depth) = walk(file, path)?;
+    // the decoder paints indices beyond the palette black
+    if let Some(entries) = entries.filter(|entries| *entries < 1 << depth) {
+        file.rewind().map_err(|e| Error::io(path, "read", e))?;
+        indices(file, size, entries, depth)?;
+    }
+    Ok(size)
+}
+
+/// The size, and of images with a palette its entries and the bits of an index.
+fn walk(file: &mut (impl Read + Seek), path: &Path) -> Result<(Size, Option<u64>, u8)> {
     let io = |e| Error::io(path, "read", e);
     skip(file, 8).map_err(io)?;
-    let (mut size, mut kind) = (None, [0; 2]);
+    let (mut size, mut kind, mut entries) = (None, [0; 2], None);
     let (mut pieces, mut metadata) = (0, 0);
     while let Some([a, b, c, d, name @ ..]) = next::<8>(file).map_err(io)? {
         let length = u64::from(u32::from_be_bytes([a, b, c, d]));
@@ -37,7 +48,10 @@ pub(super) fn check(file: &mut (impl Read + Seek), path: &Path) -> Result<Size> 
                 skip(file, 4).map_err(io)?;
                 continue;
             }
-            b"PLTE" => palette(length, kind)?,
+            b"PLTE" => {
+                palette(length, kind)?;
+                entries = Some(length / 3).filter(|_| kind[1] == INDEXED);
+            }
             b"iCCP" => {
                 at_most("bytes of compressed colour profile", length, MAX_PROFILE_BYTES)?;
                 let mut chunk = Vec::new();
@@ -56,7 +70,34 @@ pub(super) fn check(file: &mut (impl Read + Seek), path: &Path) -> Result<Size> 
         }
         skip(file, length + 4).map_err(io)?;
     }
-    Ok(size)
+    Ok((size, entries, kind[0]))
+}
+
+/// Refuses images with an index beyond the palette. What else is wrong with the file, the decoder says later.
+fn indices(file: &mut (impl BufRead + Seek), size: Size, entries: u64, depth: u8) -> Result<()> {
+    let limits = png::Limits { bytes: MAX_METADATA_BYTES as usize };
+    let Ok(mut reader) = png::Decoder::new_with_limits(file, limits).read_info() else { return Ok(()) };
+    let width = size.map_or(0, |[width, _]| width);
+    while let Ok(Some(row)) = reader.next_interlaced_row() {
+        let bits = usize::from(depth.clamp(1, 8));
+        let each = 8 / bits;
+        // rows of a pass are shorter, and end with bits that are no pixels
+        let interlaced = !matches!(row.interlace(), png::InterlaceInfo::Null(_));
+        let count = if interlaced { row.data().len() * each } else { width as usize };
+        if interlaced && each > 1 {
+            return Ok(());
+        }
+        let mask = (1_u16 << bits) as u8;
+        let index = |x: usize| row.data()[x / each] >> (8 - bits - bits * (x % each)) & mask.wrapping_sub(1);
+        if let Some(found) =
+            (0..count.min(row.data().len() * each)).map(index).find(|i| u64::from(*i) >= entries)
+        {
+            return Err(Error::invalid(format!(
+                "damaged PNG file: a pixel has colour {found} of a palette of {entries}"
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// A palette has 1 to 2ⁿ entries of three bytes, with n bits to an index.
