@@ -53,23 +53,23 @@ fn palettes_are_whole_entries_that_indices_reach() {
 
 #[test]
 fn indices_lie_within_the_palette() {
-    let image = |depth: png::BitDepth, entries: usize, index: u8| {
+    let image = |depth: ::png::BitDepth, entries: usize, index: u8| {
         let mut out = Vec::new();
-        let mut encoder = png::Encoder::new(&mut out, 5, 2);
-        encoder.set_color(png::ColorType::Indexed);
+        let mut encoder = ::png::Encoder::new(&mut out, 5, 2);
+        encoder.set_color(::png::ColorType::Indexed);
         encoder.set_depth(depth);
         encoder.set_palette(vec![9; 3 * entries]);
         let mut writer = encoder.write_header().unwrap();
         // two pixels to a byte, the last half of a row unused
         let data = match depth {
-            png::BitDepth::Four => vec![0x01, 0x10, 0x0F, 0x01, index << 4, 0x1F],
+            ::png::BitDepth::Four => vec![0x01, 0x10, 0x0F, 0x01, index << 4, 0x1F],
             _ => vec![0, 1, 1, 0, 0, 0, 1, index, 0, 0],
         };
         writer.write_image_data(&data).unwrap();
         drop(writer);
         look(ImageFormat::Png, out)
     };
-    for depth in [png::BitDepth::Four, png::BitDepth::Eight] {
+    for depth in [::png::BitDepth::Four, ::png::BitDepth::Eight] {
         assert_eq!(image(depth, 3, 2).unwrap(), Some([5, 2]));
         refused(image(depth, 3, 3), &["colour 3", "palette of 3"]);
         assert!(image(depth, 4, 3).is_ok());
