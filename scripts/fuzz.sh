@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Fuzzes every target of fuzz/targets for so many seconds, one after the other, on one core, and prints a table, or with --json
-# a JSON object per target. Guided by coverage (libFuzzer) where cargo-fuzz and a nightly toolchain are there, else by plain
+# one object that `veni-results add` takes. Guided by coverage (libFuzzer) where cargo-fuzz and a nightly toolchain are there, else by plain
 # mutations. Fails if anything crashed, hung for 10 s or took more than 1.2 GiB; what did is in target/fuzz/artifacts.
 #
 #   scripts/fuzz.sh SECONDS [--json] [--stable] [--learn] [TARGET …]
@@ -23,6 +23,10 @@ done
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 work=$target/fuzz
 mkdir -p "$work/artifacts"
+# in memory where there is such a place: every input is a file
+VENI_FUZZ_DIR=$(mktemp -d -p /dev/shm 2>/dev/null || mktemp -d)
+export VENI_FUZZ_DIR
+trap 'rm -rf "$VENI_FUZZ_DIR"' EXIT
 cargo build --release --quiet -p veni-fuzz-targets --features "$features" >&2
 runner=$target/release/fuzz-stable
 ((${#chosen[@]})) || mapfile -t chosen < <("$runner")
@@ -48,8 +52,8 @@ guided() {
         begin=$SECONDS
         "$binary" "$work/corpus/$name" "$work/seeds/$name" -artifact_prefix="$work/artifacts/$name/" -max_len=65536 \
             -timeout=10 -rss_limit_mb=1229 -max_total_time="$left" -print_final_stats=1 >"$log" 2>&1 || true
-        value() { sed -n "s/^stat::$1: *//p" "$log" | tail -1; }
-        inputs=$((inputs + $(value number_of_executed_units || echo 0)))
+        value() { sed -n "s/^stat::$1: *//p; \$a 0" "$log" | sort -n | tail -1; }
+        inputs=$((inputs + $(value number_of_executed_units)))
         memory=$(printf '%s\n' "$memory" "$(value peak_rss_mb)" | sort -n | tail -1)
         slowest=$(printf '%s\n' "$slowest" "$(value slowest_unit_time_sec)" | sort -n | tail -1)
         left=$((left - (SECONDS - begin > 0 ? SECONDS - begin : 1)))
@@ -60,12 +64,14 @@ guided() {
 }
 mutated() {
     # memory beyond the limit ends the process, and so is found
-    (ulimit -v 4000000 && "$runner" "$1" "$seconds" "${VENI_FUZZ_SEED:-$RANDOM}" "$work/artifacts") ||
-        printf '{"target":"%s","by":"mutations","seconds":%d,"inputs":0,"crashes":1,"memory_mib":0,"slowest_ms":0}\n' "$1" "$seconds"
+    (ulimit -v 4000000 && "$runner" "$1" "$seconds" "${VENI_FUZZ_SEED:-$RANDOM}" "$work/artifacts") && return
+    find "$VENI_FUZZ_DIR" -name input -exec cp {} "$work/artifacts/$1-ended" \;
+    printf '{"target":"%s","by":"mutations","seconds":%d,"inputs":0,"crashes":1,"memory_mib":0,"slowest_ms":0}\n' "$1" "$seconds"
 }
 : >"$work/results.jsonl"
 for name in "${chosen[@]}"; do
     if ((stable)); then mutated "$name"; else guided "$name"; fi >>"$work/results.jsonl"
 done
-if ((json)); then cat "$work/results.jsonl"; else "$runner" --table <"$work/results.jsonl"; fi
+if ((json)); then table=(--table --json); else table=(--table); fi
+"$runner" "${table[@]}" <"$work/results.jsonl"
 ! grep -qv '"crashes":0[,}]' "$work/results.jsonl" || { echo "fuzz: something crashed, hung or filled the memory: $work/artifacts" >&2; exit 1; }

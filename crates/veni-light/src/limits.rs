@@ -53,7 +53,8 @@ pub fn at_most(what: &str, value: u64, limit: u64) -> Result<()> {
 pub fn read_file(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>> {
     let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
     let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
-    let refuse = || Error::too_large(format!("not {what} (larger than {limit} bytes)")).in_file(path);
+    let most = if limit >= 1 << 20 { format!("{} MiB", limit >> 20) } else { format!("{limit} bytes") };
+    let refuse = || Error::too_large(format!("not {what} (larger than {most})")).in_file(path);
     if size > limit {
         return Err(refuse());
     }

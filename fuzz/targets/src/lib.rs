@@ -64,7 +64,7 @@ pub fn run(name: &str, data: &[u8]) {
     (target(name).run)(&on_disk(data));
 }
 
-/// Writes the input to the one file of this thread, which is there after a crash too.
+/// Writes the input to the one file of this thread, below `VENI_FUZZ_DIR` if that is set. It is there after an abort too.
 ///
 /// # Panics
 /// If it cannot be written.
@@ -75,9 +75,8 @@ pub fn on_disk(data: &[u8]) -> PathBuf {
     PLACE.with(|place| {
         let mut place = place.borrow_mut();
         let folder = place.get_or_insert_with(|| {
-            let memory = Path::new("/dev/shm");
-            let parent = if memory.is_dir() { memory.to_path_buf() } else { std::env::temp_dir() };
-            tempfile::Builder::new().prefix("veni-fuzz-").tempdir_in(parent).expect("a folder for the input")
+            let parent = std::env::var_os("VENI_FUZZ_DIR").map_or_else(std::env::temp_dir, PathBuf::from);
+            tempfile::tempdir_in(parent).expect("a folder for the input")
         });
         let path = folder.path().join("input");
         std::fs::write(&path, data).expect("the input can be written");

@@ -4,7 +4,7 @@
 //! - `fuzz-stable TARGET SECONDS [SEED] [FOLDER]`: runs one and prints one JSON object. Inputs that panic are kept in FOLDER;
 //!   one that takes longer than 10 s, or ends the process in another way, is left in the folder of the input
 //! - `fuzz-stable --seeds FOLDER`: writes seeds and corpus of every target to FOLDER/TARGET
-//! - `fuzz-stable --table`: the JSON objects of standard input as a table
+//! - `fuzz-stable --table [--json]`: the JSON objects of standard input as a table, or as one object for docs/results
 #![allow(clippy::print_stdout, reason = "a command's result")]
 
 use std::io::BufRead;
@@ -20,7 +20,8 @@ fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();
     match args.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         [] => targets().iter().for_each(|target| println!("{}", target.name)),
-        ["--table"] => table(),
+        ["--table"] => table(false),
+        ["--table", "--json"] => table(true),
         ["--seeds", folder] => write_seeds(Path::new(folder)),
         [name, ref rest @ ..] => {
             let number = |at: usize| rest.get(at).map_or(1, |text| text.parse().expect("a whole number"));
@@ -70,16 +71,32 @@ fn write_seeds(folder: &Path) {
     }
 }
 
-fn table() {
-    println!("| target | by | seconds | inputs | crashes | memory, MiB | slowest, ms |");
-    println!("|---|---|--:|--:|--:|--:|--:|");
-    let mut total = 0;
-    for line in std::io::stdin().lock().lines() {
-        let value: Value = serde_json::from_str(&line.expect("text")).expect("a JSON object");
-        let cell = |key: &str| value[key].as_str().map_or_else(|| value[key].to_string(), str::to_owned);
-        total += value["inputs"].as_u64().unwrap_or(0);
-        let cells = ["target", "by", "seconds", "inputs", "crashes", "memory_mib", "slowest_ms"].map(cell);
-        println!("| {} |", cells.join(" | "));
+const COLUMNS: [&str; 7] = ["target", "by", "seconds", "inputs", "crashes", "memory_mib", "slowest_ms"];
+const TITLES: [&str; 7] = ["target", "by", "seconds", "inputs", "crashes", "memory, MiB", "slowest, ms"];
+
+/// As a page, or as one object of the form that the results of the project are kept in.
+fn table(json: bool) {
+    let lines = std::io::stdin().lock().lines();
+    let rows: Vec<Value> =
+        lines.map(|line| serde_json::from_str(&line.expect("text")).expect("a JSON object")).collect();
+    let total: u64 = rows.iter().filter_map(|row| row["inputs"].as_u64()).sum();
+    let note = format!("{total} inputs in all.");
+    if json {
+        // by hand: the columns stay in their order
+        let pair = |row: &Value, (key, title): (&str, &str)| format!("{}:{}", Value::from(title), row[key]);
+        let named = |row: &Value| {
+            let pairs: Vec<_> = COLUMNS.into_iter().zip(TITLES).map(|column| pair(row, column)).collect();
+            format!("{{{}}}", pairs.join(","))
+        };
+        let rows: Vec<_> = rows.iter().map(named).collect();
+        let (rows, note) = (rows.join(","), Value::from(note));
+        println!(r#"{{"name":"fuzzing","title":"Fuzzing","rows":[{rows}],"notes":[{note}]}}"#);
+        return;
     }
-    println!("\n{total} inputs in all.");
+    println!("| {} |\n|---|---|--:|--:|--:|--:|--:|", TITLES.join(" | "));
+    for row in &rows {
+        let cell = |key: &str| row[key].as_str().map_or_else(|| row[key].to_string(), str::to_owned);
+        println!("| {} |", COLUMNS.map(cell).join(" | "));
+    }
+    println!("\n{note}");
 }

@@ -40,7 +40,7 @@ fn weights(path: &Path) -> bool {
 }
 
 fn lines() -> Vec<Vec<u8>> {
-    vec![b"steps=10\nbatch=4\ndata.grid=64\n".to_vec(), b"seed=7".to_vec()]
+    vec![b"steps=500\nloss.kld=1\nmodel.encoder.depth=2\n".to_vec(), b"seed=7".to_vec()]
 }
 
 fn configs() -> Vec<Vec<u8>> {

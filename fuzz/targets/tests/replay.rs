@@ -11,7 +11,7 @@ use veni_fuzz_targets::{PIXELS, Target, corpus, on_disk, targets};
 
 /// Mutations of each target, and the time after which a slow machine runs fewer.
 const MUTATIONS: usize = 2000;
-const SECONDS: f64 = 1.2;
+const SECONDS: f64 = 1.0;
 /// Memory of the process: 1 GiB and what the pixels that may be declared take.
 const MEMORY: u64 = (1 << 30) + veni_image::limits::READ_BYTES_PER_PIXEL * PIXELS as u64;
 

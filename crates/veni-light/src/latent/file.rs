@@ -163,7 +163,7 @@ mod tests {
         std::fs::write(&path, [0xff, 0xfe, 0, 1]).unwrap();
         assert!(Latent::load(&path).unwrap_err().to_string().contains("noise.json"));
         std::fs::write(&path, vec![b' '; MAX_LATENT_BYTES as usize + 1]).unwrap();
-        assert!(Latent::load(&path).unwrap_err().to_string().contains("larger than 16777216 bytes"));
+        assert!(Latent::load(&path).unwrap_err().to_string().contains("larger than 16 MiB"));
         let nan = Latent::new(vec![[f32::NAN, 0.0, 0.0]]);
         assert!(nan.save(&path, Overwrite::Replace).is_err());
     }
