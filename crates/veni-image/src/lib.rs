@@ -27,6 +27,7 @@ mod read;
 mod resample;
 mod sanitise;
 mod sheet;
+pub mod texture;
 pub mod tonemap;
 mod write;
 

@@ -4,6 +4,12 @@
 
 mod compact;
 mod environment;
+mod prefilter;
+mod quadrature;
+mod reduce;
+mod spectrum;
 
 pub use compact::{CompactLight, Kind, RadiusSource};
 pub use environment::EnvironmentMap;
+pub use prefilter::{CubeAxes, CubeMap, Dfg, Law, Levels, Prefilter};
+pub use spectrum::{MAX_DEGREE, Spectrum};
