@@ -51,6 +51,7 @@ pub(crate) enum Command {
     Synth(commands::synth::Synth),
     Encode(commands::encode::Encode),
     Fit(commands::fit::Fit),
+    Ibl(commands::ibl::Ibl),
     Prepare(commands::prepare::Prepare),
     RenderProbe(commands::render_probe::RenderProbe),
     #[cfg(feature = "learn")]
@@ -72,6 +73,7 @@ impl Command {
             Self::Synth(c) => c.run(report),
             Self::Encode(c) => c.run(report),
             Self::Fit(c) => c.run(report),
+            Self::Ibl(c) => c.run(report),
             Self::Prepare(c) => c.run(report),
             Self::RenderProbe(c) => c.run(report),
             #[cfg(feature = "learn")]

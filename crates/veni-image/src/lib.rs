@@ -19,6 +19,8 @@
 #![forbid(unsafe_code)]
 
 mod colour;
+pub mod engine;
+mod equal_area;
 pub mod exposure;
 pub mod metrics;
 mod panorama;

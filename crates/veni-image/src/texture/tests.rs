@@ -2,7 +2,6 @@
 
 use veni_light::light::CubeMap;
 
-use super::texel::tests::{from_e5b9g9r9, from_r11g11b10};
 use super::*;
 
 /// Levels whose texels all differ.
@@ -19,13 +18,13 @@ fn levels(size: usize, count: usize) -> Vec<CubeMap> {
 #[test]
 fn a_ktx2_file_is_what_another_reader_reads() {
     for (format, vk, descriptor) in [
-        (TexelFormat::E5B9G9R9, ktx2::Format::E5B9G9R9_UFLOAT_PACK32, 0x7c),
-        (TexelFormat::Rgba16F, ktx2::Format::R16G16B16A16_SFLOAT, 0x5c),
+        (TexelFormat::E5B9G9R9, ::ktx2::Format::E5B9G9R9_UFLOAT_PACK32, 0x7c),
+        (TexelFormat::Rgba16F, ::ktx2::Format::R16G16B16A16_SFLOAT, 0x5c),
     ] {
         let levels = levels(8, 4);
         let file = super::ktx2(&levels, format).unwrap();
         assert_eq!(file, super::ktx2(&levels, format).unwrap());
-        let reader = ktx2::Reader::new(&file[..]).unwrap();
+        let reader = ::ktx2::Reader::new(&file[..]).unwrap();
         let header = reader.header();
         assert_eq!(header.format, Some(vk));
         assert_eq!(
@@ -38,7 +37,7 @@ fn a_ktx2_file_is_what_another_reader_reads() {
             assert_eq!(data.data.len(), level.texels().len() * format.bytes());
             for (texel, bytes) in level.texels().iter().zip(data.data.chunks_exact(format.bytes())) {
                 let found = match format {
-                    TexelFormat::E5B9G9R9 => from_e5b9g9r9(u32::from_le_bytes(bytes.try_into().unwrap())),
+                    TexelFormat::E5B9G9R9 => decode_e5b9g9r9(u32::from_le_bytes(bytes.try_into().unwrap())),
                     _ => [0, 2, 4].map(|k| half::f16::from_le_bytes([bytes[k], bytes[k + 1]]).to_f32()),
                 };
                 for (a, b) in found.into_iter().zip(texel) {
@@ -49,9 +48,9 @@ fn a_ktx2_file_is_what_another_reader_reads() {
         let keys: Vec<_> = reader.key_value_data().collect();
         assert_eq!(keys.len(), 2);
         assert_eq!(keys[0], ("KTXorientation", &b"rd\0"[..]));
-        assert_eq!(reader.dfd_blocks().count(), 1);
+        assert_eq!(reader.dfd_blocks().len(), 1);
         // a file cut short is refused
-        assert!(ktx2::Reader::new(&file[..file.len() - 1]).is_err());
+        assert!(::ktx2::Reader::new(&file[..file.len() - 1]).is_err());
         let own = Ktx2Header::read(&file).unwrap();
         assert_eq!((own.vk_format, own.width, own.faces, own.levels), (vk.value(), 8, 6, 4));
     }
@@ -74,7 +73,7 @@ fn a_ktx1_file_is_laid_out_as_the_format_says() {
         assert_eq!(face, level.size() * level.size() * 4);
         at += 4;
         for (k, texel) in level.texels().iter().enumerate() {
-            let found = from_r11g11b10(word(at + 4 * k));
+            let found = decode_r11g11b10(word(at + 4 * k));
             for (a, b) in found.into_iter().zip(texel) {
                 assert!((a - b).abs() < b / 60.0, "{found:?} for {texel:?}");
             }
@@ -105,7 +104,7 @@ fn an_env_file_holds_six_images_per_level() {
     assert_eq!((header.version, header.width, header.specular.mipmaps.len()), (1, 8, 24));
     let json = file.iter().position(|b| *b == 0).unwrap();
     let value: serde_json::Value = serde_json::from_slice(&file[8..json]).unwrap();
-    assert_eq!(value["irradiance"]["xy"], serde_json::json!([8.5, 1.0, -0.25]));
+    assert_eq!(value["irradiance"]["xy"], serde_json::json!([8.5, 1, -0.25]));
     for (k, image) in header.specular.mipmaps.iter().enumerate() {
         let bytes = &file[json + 1 + image.position as usize..][..image.length as usize];
         let decoded = image::load_from_memory(bytes).unwrap().to_rgba8();

@@ -81,19 +81,23 @@ fn r11g11b10([r, g, b]: [f32; 3]) -> u32 {
     float(b, 5) << 22 | float(g, 6) << 11 | float(r, 6)
 }
 
+/// A texel of [`TexelFormat::E5B9G9R9`].
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) fn decode_e5b9g9r9(bits: u32) -> [f32; 3] {
+    let scale = ((bits >> 27) as f32 - 15.0 - 9.0).exp2();
+    [0, 9, 18].map(|shift| ((bits >> shift) & 511) as f32 * scale)
+}
+
+/// A texel of [`TexelFormat::R11G11B10`].
+#[cfg(test)]
+pub(crate) fn decode_r11g11b10(bits: u32) -> [f32; 3] {
+    let half = |v: u32, bits: u32| f16::from_bits((v << (10 - bits)) as u16).to_f32();
+    [half(bits & 2047, 6), half(bits >> 11 & 2047, 6), half(bits >> 22, 5)]
+}
+
+#[cfg(test)]
+mod tests {
     use super::*;
-
-    pub(in crate::texture) fn from_e5b9g9r9(bits: u32) -> [f32; 3] {
-        let scale = ((bits >> 27) as f32 - 15.0 - 9.0).exp2();
-        [0, 9, 18].map(|shift| ((bits >> shift) & 511) as f32 * scale)
-    }
-
-    pub(in crate::texture) fn from_r11g11b10(bits: u32) -> [f32; 3] {
-        let half = |v: u32, bits: u32| f16::from_bits((v << (10 - bits)) as u16).to_f32();
-        [half(bits & 2047, 6), half(bits >> 11 & 2047, 6), half(bits >> 22, 5)]
-    }
 
     #[test]
     fn values_survive_to_the_formats_precision() {
@@ -101,19 +105,20 @@ pub(super) mod tests {
         for v in values {
             let texel = [v, 0.5 * v, 0.26 * v];
             let largest = v.max(2f32.powi(-15));
-            for (a, b) in from_e5b9g9r9(e5b9g9r9(texel)).into_iter().zip(texel) {
+            for (a, b) in decode_e5b9g9r9(e5b9g9r9(texel)).into_iter().zip(texel) {
                 assert!((a - b).abs() <= largest / 511.0, "{b} became {a}");
             }
             if v < 64000.0 {
-                for ((a, b), bits) in from_r11g11b10(r11g11b10(texel)).into_iter().zip(texel).zip([6, 6, 5]) {
+                for ((a, b), bits) in decode_r11g11b10(r11g11b10(texel)).into_iter().zip(texel).zip([6, 6, 5])
+                {
                     let step = b.max(2f32.powi(-14)) / (1 << bits) as f32;
                     assert!((a - b).abs() <= 0.51 * step, "{b} became {a} in {bits} bits");
                 }
             }
         }
-        assert_eq!(from_e5b9g9r9(e5b9g9r9([0.0; 3])), [0.0; 3]);
-        assert_eq!(from_e5b9g9r9(e5b9g9r9([65408.0; 3])), [65408.0; 3]);
-        assert_eq!(from_r11g11b10(r11g11b10([64512.0, 0.0, 64512.0])), [64512.0, 0.0, 64512.0]);
+        assert_eq!(decode_e5b9g9r9(e5b9g9r9([0.0; 3])), [0.0; 3]);
+        assert_eq!(decode_e5b9g9r9(e5b9g9r9([65408.0; 3])), [65408.0; 3]);
+        assert_eq!(decode_r11g11b10(r11g11b10([64512.0, 0.0, 64512.0])), [64512.0, 0.0, 64512.0]);
         // what a graphics API's documentation gives for white
         assert_eq!(r11g11b10([1.0; 3]), 0x781e_03c0);
     }

@@ -2,14 +2,28 @@
 //!
 //! Radiance is linear Rec. 709 in the units of the map; directions are of the [native frame](crate::sphere).
 
+mod angle;
 mod compact;
+mod disc;
 mod environment;
+mod extract;
+mod lit;
+mod luminance;
 mod prefilter;
 mod quadrature;
 mod reduce;
+mod sampler;
+pub mod sh;
 mod spectrum;
+mod turn;
 
 pub use compact::{CompactLight, Kind, RadiusSource};
+pub use disc::Disc;
 pub use environment::EnvironmentMap;
+pub use extract::SunChoice;
+pub use lit::{Light, LightOptions};
+pub use luminance::{LUMINANCE, luminance};
 pub use prefilter::{CubeAxes, CubeMap, Dfg, Law, Levels, Prefilter};
+pub use sampler::{Sample, Sampler, SplitSampler};
+pub use sh::Sh;
 pub use spectrum::{MAX_DEGREE, Spectrum};

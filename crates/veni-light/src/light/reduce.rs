@@ -4,6 +4,7 @@ use super::EnvironmentMap;
 use crate::sphere::Equirect;
 
 /// A map, or a smaller one of the same light.
+#[derive(Clone, Debug)]
 pub(super) struct Reduced<'a> {
     map: EnvironmentMap<'a>,
     halved: Option<(Equirect, Vec<[f32; 3]>)>,

@@ -8,6 +8,7 @@ use std::f64::consts::PI;
 
 use super::{CubeAxes, CubeMap};
 use crate::light::EnvironmentMap;
+use crate::light::angle::pixel;
 use crate::light::reduce::Reduced;
 use crate::sphere::{CubeFace, Equirect};
 
@@ -22,15 +23,13 @@ impl CubeMap {
     pub fn of_map(map: EnvironmentMap<'_>, size: usize, axes: CubeAxes) -> Self {
         assert!(size > 0, "a cube map without texels");
         let ceiling = map.integral().map(|s| (BRIGHT * s / (4.0 * PI)) as f32);
-        let reduced = Reduced::below(map, 8 * size, ceiling);
+        let reduced = Reduced::below(map, 4 * size, ceiling);
         let dim = reduced.map();
         let grid = dim.grid();
         // a texel in the middle of a face spans 2/size rad, a pixel 2π/W
         let samples = (grid.width as f64 / (PI * size as f64) * 1.5).ceil().clamp(1.0, 16.0) as usize;
-        let mut cube = Self::of(size, axes, samples, |direction| {
-            let value = bilinear(grid, dim.pixels(), &ceiling, direction);
-            [value[0], value[1], value[2]]
-        });
+        let mut cube =
+            Self::of(size, axes, samples, |direction| bilinear(grid, dim.pixels(), &ceiling, direction));
         cube.add_bright(map, ceiling, axes);
         cube.scale_to(map.integral());
         cube
@@ -73,9 +72,9 @@ impl CubeMap {
 #[inline]
 fn bilinear(grid: Equirect, pixels: &[[f32; 3]], ceiling: &[f32; 3], direction: [f32; 3]) -> [f32; 3] {
     let Equirect { width, height } = grid;
-    let [x, y] = grid.pixel(direction).map(|v| v - 0.5);
+    let [x, y] = pixel(grid, direction).map(|v| v - 0.5);
     let (left, top) = (x.floor(), y.floor());
-    let (u, v) = ((x - left) as f32, (y - top) as f32);
+    let (u, v) = (x - left, y - top);
     let mut sum = [0.0; 3];
     for (j, down) in [(top as isize, 1.0 - v), (top as isize + 1, v)] {
         let (row, turn) = if j < 0 {

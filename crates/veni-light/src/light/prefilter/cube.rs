@@ -73,25 +73,26 @@ impl CubeMap {
     ) -> Self {
         let mut texels = vec![[0.0; 3]; 6 * size * size];
         let n = samples.max(1);
-        let place = |k: usize, s: usize| (2 * (k * n + s) + 1) as f64 / (size * n) as f64 - 1.0;
+        let place = |k: usize, s: usize| ((2 * (k * n + s) + 1) as f64 / (size * n) as f64 - 1.0) as f32;
         tasks::each(
             texels.chunks_exact_mut(size).enumerate(),
             || (),
             |(), (line, texels)| {
                 let (face, row) = (CubeFace::ALL[line / size], line % size);
                 for (column, texel) in texels.iter_mut().enumerate() {
-                    let (mut sum, mut weight) = ([0f64; 3], 0.0);
+                    let (mut sum, mut weight) = ([0f32; 3], 0.0);
                     for s in 0..n * n {
                         let (a, b) = (place(column, s % n), place(row, s / n));
                         let square = 1.0 + a * a + b * b;
                         let scale = 1.0 / square.sqrt();
                         let w = scale / square;
-                        let value = radiance(axes.native(face.lookup(a, b)).map(|v| (v * scale) as f32));
-                        sum = [0, 1, 2].map(|c| sum[c] + w * f64::from(value[c]));
+                        let v = face.lookup(f64::from(a), f64::from(b)).map(|v| v as f32 * scale);
+                        let value = radiance(axes.native(v));
+                        sum = [0, 1, 2].map(|c| sum[c] + w * value[c]);
                         weight += w;
                     }
                     // a spectrum cut off may fall below zero by its last waves
-                    *texel = sum.map(|s| (s / weight).max(0.0) as f32);
+                    *texel = sum.map(|s| (s / weight).max(0.0));
                 }
             },
         );
@@ -128,8 +129,8 @@ mod tests {
             for (k, face) in CubeFace::ALL.into_iter().enumerate() {
                 for t in 0..size * size {
                     let centre = |i: usize| (2 * i + 1) as f64 / size as f64 - 1.0;
-                    let v = axes.native(face.lookup(centre(t % size), centre(t / size)));
-                    assert_eq!(CubeMap::index(size, axes, v.map(|x| x as f32)), k * size * size + t);
+                    let v = axes.native(face.lookup(centre(t % size), centre(t / size)).map(|x| x as f32));
+                    assert_eq!(CubeMap::index(size, axes, v), k * size * size + t);
                 }
             }
         }

@@ -19,7 +19,7 @@ pub struct Dfg {
 impl Dfg {
     /// A table of `size` × `size`.
     pub fn new(size: usize) -> Self {
-        let (radial, around) = (gauss_legendre(64), gauss_legendre(64));
+        let (radial, around) = (gauss_legendre(48), gauss_legendre(24));
         let rows = tasks::map(
             0..size,
             || (),

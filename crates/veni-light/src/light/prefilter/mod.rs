@@ -113,13 +113,14 @@ impl<'a> Prefilter<'a> {
 /// Enough for diffuse light: |A_l| / π of a cosine falls as l^−2.5.
 const DIFFUSE_DEGREE: usize = 64;
 
-/// The degree at which the lobe has fallen below about 1e-4 of its power.
+/// The degree at which the lobe's spectrum has fallen to about 6e-4.
 fn degree_of(alpha: f64) -> usize {
-    ((6.0 / alpha).ceil() as usize).min(MOST_DEGREES)
+    ((4.6 / alpha).ceil() as usize).min(MOST_DEGREES)
 }
 
 /// Beyond this only lobes narrower than two texels of usual maps have anything.
-const MOST_DEGREES: usize = if MAX_DEGREE < 639 { MAX_DEGREE } else { 639 };
+const MOST_DEGREES: usize = 511;
+const _: () = assert!(MOST_DEGREES <= MAX_DEGREE);
 
 #[cfg(test)]
 mod tests;

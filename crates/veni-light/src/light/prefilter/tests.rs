@@ -102,9 +102,9 @@ fn places(size: usize, axes: CubeAxes, sun: [f32; 3]) -> Vec<usize> {
 fn direction(size: usize, axes: CubeAxes, index: usize) -> [f32; 3] {
     let (face, k) = (CubeFace::ALL[index / (size * size)], index % (size * size));
     let centre = |i: usize| (2 * i + 1) as f64 / size as f64 - 1.0;
-    let v = axes.native(face.lookup(centre(k % size), centre(k / size)));
-    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-    v.map(|x| (x / length) as f32)
+    let v = axes.native(face.lookup(centre(k % size), centre(k / size)).map(|x| x as f32));
+    let length = v.iter().map(|x| x * x).sum::<f32>().sqrt();
+    v.map(|x| x / length)
 }
 
 /// Relative RMSE over texels that are spread evenly and around the sun.

@@ -1,5 +1,6 @@
 //! A smooth function on rings of latitude, interpolated anywhere by Lagrange polynomials through 6 × 6 samples.
 
+use crate::light::angle::pixel;
 use crate::sphere::Equirect;
 
 /// Samples on each side of a place.
@@ -35,7 +36,7 @@ impl Rings {
     /// The value in a unit direction.
     #[inline]
     pub(in crate::light) fn at(&self, direction: [f32; 3]) -> [f32; 3] {
-        let [x, y] = self.grid.pixel(direction);
+        let [x, y] = pixel(self.grid, direction);
         let (column, across) = split(x);
         let (row, down) = split(y);
         let mut sum = [0.0; 3];
@@ -53,10 +54,10 @@ impl Rings {
 
 /// The first of six padded samples around a continuous pixel coordinate (centres at halves), and their weights.
 #[inline]
-fn split(at: f64) -> (usize, [f32; 2 * REACH]) {
+fn split(at: f32) -> (usize, [f32; 2 * REACH]) {
     let at = at - 0.5;
     let low = at.floor();
-    let t = (at - low) as f32;
+    let t = at - low;
     // nodes at −2 … 3
     let (a, b, c, d, e, f) = (t + 2.0, t + 1.0, t, t - 1.0, t - 2.0, t - 3.0);
     let weights = [

@@ -11,7 +11,7 @@ use super::{Rings, Spectrum};
 use crate::sphere::Equirect;
 use crate::tasks;
 
-/// The spectrum times one gain per degree, on rings that hold four samples of the shortest wave.
+/// The spectrum times one gain per degree, on rings that hold three samples of the shortest wave.
 pub(super) fn synthesise(spectrum: &Spectrum, gains: &[f64]) -> Rings {
     let degree = spectrum.degree.min(gains.len().saturating_sub(1));
     let grid = grid(degree);
@@ -34,9 +34,10 @@ pub(super) fn synthesise(spectrum: &Spectrum, gains: &[f64]) -> Rings {
     Rings::new(grid, &pixels)
 }
 
-/// Four columns per wave of the highest order, of a width whose transform is fast, rows in whole blocks.
+/// Three columns per wave of the highest order, of a width whose transform is fast,
+/// rows in whole blocks.
 fn grid(degree: usize) -> Equirect {
-    let least = 4 * (degree + 1);
+    let least = 3 * (degree + 1);
     let width =
         [32, 48, 64, 80, 96, 128, 160, 192, 224, 256, 320, 384, 448, 512, 640, 768, 896, 1024, 1280, 1536]
             .into_iter()
@@ -139,10 +140,10 @@ mod tests {
     use crate::light::EnvironmentMap;
 
     #[test]
-    fn grids_have_whole_blocks_and_four_columns_per_wave() {
+    fn grids_have_whole_blocks_and_three_columns_per_wave() {
         for degree in 0..1024 {
             let Equirect { width, height } = grid(degree);
-            assert!(width >= 4 * (degree + 1) && width <= 6 * (degree + 1) + 32, "{degree}: {width}");
+            assert!(width >= 3 * (degree + 1) && width <= 5 * (degree + 1) + 32, "{degree}: {width}");
             assert!(height / 2 % LANES == 0 && 2 * height == width, "{degree}: {width} × {height}");
         }
     }
