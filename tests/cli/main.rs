@@ -27,6 +27,8 @@ mod ibl;
 mod inspect;
 #[cfg(feature = "learn")]
 mod large_sets;
+#[cfg(feature = "pretrained")]
+mod light;
 #[cfg(feature = "onnx")]
 #[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-data's tests use the rest of it")]

@@ -54,6 +54,7 @@ pub(crate) enum Command {
     Ibl(commands::ibl::Ibl),
     Prepare(commands::prepare::Prepare),
     RenderProbe(commands::render_probe::RenderProbe),
+    Light(commands::light::Light),
     #[cfg(feature = "learn")]
     Evaluate(commands::evaluate::Evaluate),
     Inspect(commands::inspect::Inspect),
@@ -76,6 +77,7 @@ impl Command {
             Self::Ibl(c) => c.run(report),
             Self::Prepare(c) => c.run(report),
             Self::RenderProbe(c) => c.run(report),
+            Self::Light(c) => c.run(report),
             #[cfg(feature = "learn")]
             Self::Evaluate(c) => c.run(report),
             Self::Inspect(c) => c.run(report),

@@ -35,6 +35,8 @@ mod write;
 
 #[cfg(test)]
 mod io_tests;
+#[cfg(test)]
+mod light_tests;
 
 pub use veni_light::{Error, Result};
 

@@ -9,6 +9,7 @@ pub(crate) mod evaluate;
 pub(crate) mod fit;
 pub(crate) mod ibl;
 pub(crate) mod inspect;
+pub(crate) mod light;
 pub(crate) mod man;
 pub(crate) mod prepare;
 pub(crate) mod render_probe;

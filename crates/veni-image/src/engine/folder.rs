@@ -46,8 +46,9 @@ impl Folder {
 
     /// A file of these bytes.
     pub(super) fn add(&mut self, name: &str, bytes: impl AsRef<[u8]>) -> Result<()> {
-        fs::write(self.staged.join(name), bytes)
-            .map_err(|e| Error::io(self.target.join(name), "write", e))?;
+        let wrap = |e| Error::io(self.target.join(name), "write", e);
+        let staged = self.staged.join(name);
+        write_atomic(&staged, Overwrite::Refuse, |file| file.write_all(bytes.as_ref()).map_err(wrap))?;
         self.names.push(name.to_owned());
         Ok(())
     }

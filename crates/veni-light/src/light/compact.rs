@@ -47,6 +47,17 @@ pub enum Kind {
     Lobe,
 }
 
+impl Kind {
+    /// The kind of a light of this angular radius, radians.
+    pub fn of(radius: f32) -> Self {
+        match radius.to_degrees() {
+            r if r < 1.5 => Self::Disc,
+            r if r <= 6.0 => Self::Glow,
+            _ => Self::Lobe,
+        }
+    }
+}
+
 impl fmt::Display for RadiusSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

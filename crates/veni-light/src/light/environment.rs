@@ -36,7 +36,7 @@ impl<'a> EnvironmentMap<'a> {
         Ok(Self { grid, pixels })
     }
 
-    /// Pixels that are known to be radiance.
+    /// Of pixels that are known to be right.
     pub(super) fn trusted(grid: Equirect, pixels: &'a [[f32; 3]]) -> Self {
         Self { grid, pixels }
     }

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use veni_image::Panorama;
 use veni_light::sphere::Equirect;
 
 use crate::args::Decoding;
 use crate::device::Device;
+use crate::output::{CUBE_FACES, with_remedy};
 use crate::report::Report;
 use crate::source;
 
@@ -25,6 +26,10 @@ pub(super) fn radiance(
     if let Some(path) = input
         && !source::is_latent(path)?
     {
+        let attributes = veni_image::attributes(path).map_err(with_remedy)?;
+        if attributes.contains_key(CUBE_FACES) {
+            bail!("{}: a cube map is not a panorama; name an equirectangular image", path.display());
+        }
         return source::panorama(path, report);
     }
     let loaded = source::model_of(&decoding.model, input)?;
