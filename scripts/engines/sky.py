@@ -25,13 +25,15 @@ def grid():
     return directions, (2 * np.pi / WIDTH * (edges[:-1] - edges[1:]))[:, None]
 
 
-def panorama():
+def panorama(sun=True):
     """Radiance (H, W, 3): a gradient with a glow around the sun, a dark ground, and the sun's disc on the pixels it covers."""
     d, w = grid()
     z = d[..., 2:]
     t = (d @ SUN)[..., None]
     sky = np.array([0.5, 0.7, 1.0]) + np.array([0.0, 0.2, 0.4]) * z + np.array([1.0, 0.9, 0.7]) * np.exp(40 * (t - 1)) * 3
     image = np.where(z < 0, np.array([0.12, 0.1, 0.08]), sky)
+    if not sun:
+        return image
     # coverage of pixels near the sun by 16 x 16 places each
     cover = np.zeros((HEIGHT, WIDTH))
     n = 16
@@ -107,6 +109,20 @@ def small(bits, mantissa):
     """Floats with five bits of exponent."""
     exponent, fraction = (bits >> mantissa).astype(np.float64), (bits & ((1 << mantissa) - 1)) / (1 << mantissa)
     return np.where(exponent == 0, fraction * 2.0 ** -14, (1 + fraction) * np.exp2(exponent - 15))
+
+
+# walls by their native normals: they tell how a map is turned, and whether it is mirrored
+WALLS = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], float)
+
+
+def check_walls(checks, name, found, scale):
+    """Radiance of white walls without the sun. Nine harmonics miss a few percent of a dark ground; a quarter turn or a mirror image
+    miss a fifth."""
+    rest = panorama(sun=False)
+    expected = scale * np.array([irradiance(rest, n) for n in WALLS]) / np.pi
+    for other, what in [(expected[[1, 2, 3, 0]], "turned"), (expected[[0, 3, 2, 1]], "mirrored"), (expected[[2, 1, 0, 3]], "mirrored")]:
+        assert np.abs(other / expected - 1).max() > 0.12, f"walls do not tell a {what} map"
+    checks.within(f"{name}: walls under the sky alone", found, expected, 0.08)
 
 
 class Checks:
