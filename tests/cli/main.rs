@@ -10,6 +10,8 @@ mod bake;
 #[cfg(feature = "learn")]
 mod crashes;
 #[cfg(feature = "pretrained")]
+mod dark_end;
+#[cfg(feature = "pretrained")]
 mod embedded;
 #[cfg(feature = "learn")]
 mod encode;
@@ -35,8 +37,10 @@ mod light;
 mod onnx_file;
 #[cfg(feature = "learn")]
 mod prepare;
-#[cfg(feature = "learn")]
+#[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without the learning world"))]
 mod readers;
+#[cfg(feature = "pretrained-large")]
+mod remembered;
 #[cfg(feature = "learn")]
 mod render_probe;
 #[cfg(feature = "learn")]
@@ -49,3 +53,5 @@ mod train_devices;
 mod training;
 #[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without the learning world"))]
 mod util;
+#[cfg(feature = "pretrained")]
+mod writers;

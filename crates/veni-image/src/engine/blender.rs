@@ -40,7 +40,7 @@ pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer)
         "README.txt",
         format!(
             "A sky for Blender. Either open sky.py in the text editor and run it, or\n\n    \
-             blender scene.blend --python blender/sky.py\n\n\
+             blender scene.blend -P blender/sky.py\n\n\
              sky.exr  the panorama{}\nsky.py   world{}\n\n\
              z is up; the centre of the panorama is at +x. Strengths are in the panorama's own unit.\n",
             if sun.is_some() { " without the sun: nothing sparkles, and shadows are sharp" } else { "" },

@@ -50,7 +50,7 @@ pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer)
             "A sky for Filament.\n\n\
              sky_ibl.ktx     GGX levels ({} levels, R11F_G11F_B10F), and diffuse light under the key \"sh\"{}\n\
              sky_skybox.ktx  what the camera sees\n\
-             sh.txt          the nine numbers of \"sh\", as cmgen --sh-shader prints them, without a window\n\
+             sh.txt          the nine numbers of \"sh\", in the form that shaders take, without a window\n\
              sky.cpp         the calls that load them\n\n\
              y is up; the centre of the panorama is at +z. One unit of radiance is {k} cd/m2; sun and sky share that constant.\n",
             levels.count(),
