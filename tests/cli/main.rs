@@ -24,6 +24,7 @@ mod fit;
 mod folds;
 #[cfg(all(feature = "learn", feature = "gpu"))]
 mod gpu;
+mod ibl;
 #[cfg(feature = "learn")]
 mod inspect;
 #[cfg(feature = "learn")]

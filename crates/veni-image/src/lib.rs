@@ -21,6 +21,8 @@
 
 mod budget;
 mod colour;
+pub mod engine;
+mod equal_area;
 pub mod exposure;
 pub mod limits;
 pub mod memory;
@@ -33,6 +35,7 @@ mod read;
 mod resample;
 mod sanitise;
 mod sheet;
+pub mod texture;
 pub mod tonemap;
 mod write;
 
