@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use veni_light::output::{Overwrite, process_token, write_atomic};
 
-use crate::{Error, HalfRange, Panorama, Precision, Result, WriteFormat, WriteOptions};
+use crate::{Error, HALF_ERROR, Panorama, Precision, Result, WriteFormat, WriteOptions, half_error};
 
 /// Files on their way into a folder: written beside it, then moved.
 pub(super) struct Folder {
@@ -53,21 +53,11 @@ impl Folder {
         Ok(())
     }
 
-    /// A panorama as EXR: halves where they hold it, else floats.
-    pub(super) fn add_panorama(&mut self, name: &str, panorama: &Panorama) -> Result<()> {
-        self.add_exr(name, panorama, true)
-    }
-
-    /// An image as EXR; `latlong` if it is a panorama.
-    pub(super) fn add_exr(&mut self, name: &str, image: &Panorama, latlong: bool) -> Result<()> {
-        let brightest = image.pixels().as_flattened().iter().fold(0f32, |a, b| a.max(*b));
-        let precision = if brightest < 65504.0 { Precision::Half } else { Precision::Float };
-        let options = WriteOptions {
-            latlong,
-            half_range: HalfRange::Refuse,
-            ..WriteOptions::new(WriteFormat::Exr(precision))
-        };
-        image.write(self.staged.join(name), &options)?;
+    /// An image as EXR: in half precision where that keeps its values.
+    pub(super) fn add_exr(&mut self, name: &str, image: &Panorama) -> Result<()> {
+        let keeps = half_error(image.pixels(), 1.0) <= HALF_ERROR;
+        let precision = if keeps { Precision::Half } else { Precision::Float };
+        image.write(self.staged.join(name), &WriteOptions::new(WriteFormat::Exr(precision)))?;
         self.names.push(name.to_owned());
         Ok(())
     }
