@@ -24,10 +24,14 @@ mod fit;
 mod folds;
 #[cfg(all(feature = "learn", feature = "gpu"))]
 mod gpu;
+mod ibl;
 #[cfg(feature = "learn")]
 mod inspect;
 #[cfg(feature = "learn")]
 mod large_sets;
+#[cfg(feature = "pretrained")]
+mod light;
+mod limits;
 #[cfg(feature = "onnx")]
 #[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-data's tests use the rest of it")]

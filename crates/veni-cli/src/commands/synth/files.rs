@@ -11,10 +11,8 @@ use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
 use veni_synth::Scene;
 
-use crate::output::{create_folder, refuse_existing, writable};
+use crate::output::{SCENE, create_folder, refuse_existing, writable};
 
-/// Attribute of a generated panorama: its parameters as JSON.
-const SCENE: &str = "veni:scene";
 /// Attribute: columns x rows.
 const SIZE: &str = "veni:size";
 /// Half precision is used so that the geometric mean of a scene comes out near this.
