@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use veni_light::output::{Overwrite, process_token, write_atomic};
 
-use crate::{Error, HALF_ERROR, Panorama, Precision, Result, WriteFormat, WriteOptions, half_error};
+use crate::{
+    Error, HALF_ERROR, HalfRange, Panorama, Precision, Result, WriteFormat, WriteOptions, half_error,
+};
 
 /// Files on their way into a folder: written beside it, then moved.
 pub(super) struct Folder {
@@ -57,7 +59,10 @@ impl Folder {
     pub(super) fn add_exr(&mut self, name: &str, image: &Panorama) -> Result<()> {
         let keeps = half_error(image.pixels(), 1.0) <= HALF_ERROR;
         let precision = if keeps { Precision::Half } else { Precision::Float };
-        image.write(self.staged.join(name), &WriteOptions::new(WriteFormat::Exr(precision)))?;
+        // what little it loses at the dark end is no reason to refuse
+        let half_range = HalfRange::Factor(1.0);
+        let options = WriteOptions { half_range, ..WriteOptions::new(WriteFormat::Exr(precision)) };
+        image.write(self.staged.join(name), &options)?;
         self.names.push(name.to_owned());
         Ok(())
     }

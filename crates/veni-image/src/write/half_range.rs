@@ -37,18 +37,20 @@ pub(super) fn fit(pixels: &[[f32; 3]]) -> f32 {
 /// The largest [`half_error`] with which a panorama is worth keeping in half precision; ordinary ones have 2e-4.
 pub const HALF_ERROR: f64 = 1.0 / 1024.0;
 
-/// The mean relative error of half precision over the values of `pixels` times `factor`; zeros count as kept, what is too
-/// large as lost.
+/// The mean relative error of half precision over the values of `pixels` times `factor`; zeros count as kept. Infinite if one
+/// value is too large.
 pub fn half_error(pixels: &[[f32; 3]], factor: f32) -> f64 {
     let values = pixels.as_flattened();
     let error = |v: &f32| {
         let value = v * factor;
-        let half = f16::from_f32(value);
-        match (*v == 0.0, half.is_finite()) {
-            (true, _) => 0.0,
-            (_, false) => 1.0,
-            _ => f64::from((half.to_f32() - value).abs() / value.abs()).min(1.0),
+        if *v == 0.0 {
+            return 0.0;
         }
+        if value.abs() > HALF_RANGE[1] {
+            return f64::INFINITY;
+        }
+        let half = f16::from_f32(value).to_f32();
+        f64::from((half - value).abs() / value.abs()).min(1.0)
     };
     values.iter().map(error).sum::<f64>() / values.len().max(1) as f64
 }
@@ -107,6 +109,7 @@ mod tests {
         let dark = [[(-26f32).exp2(), (-24f32).exp2(), 1.0]];
         assert!((half_error(&dark, 1.0) - 1.0 / 3.0).abs() < 1e-9);
         assert_eq!(half_error(&dark, 4.0), 0.0);
-        assert_eq!(half_error(&[[1e5, 1.0, 1.0]], 1.0), 1.0 / 3.0);
+        assert_eq!(half_error(&[[1e5, 1.0, 1.0]], 1.0), f64::INFINITY);
+        assert!(half_error(&[[65_510.0, 1.0, 1.0]], 1.0) > HALF_ERROR);
     }
 }
