@@ -6,8 +6,11 @@
 //!
 //! | step | here |
 //! |---|---|
+//! | a file of any format | [`Content`] |
 //! | OpenEXR and Radiance `.hdr` files | [`Panorama::read`], [`Panorama::read_with`], [`attributes`] |
 //! | PNG, JPEG, WebP, and radiance from them | [`LdrPanorama`] |
+//! | what files say of their numbers | [`METADATA`] |
+//! | what is unknown of a panorama | [`Panorama::known`], [`Panorama::fill`] |
 //! | pictures of any shape, masks | [`Picture`], [`read_mask`] |
 //! | NaN, infinite, negative values | [`Panorama::sanitise`] |
 //! | other sizes, turned, mirrored | [`Panorama::resample`], [`Panorama::turn`], [`Panorama::mirror`] |
@@ -20,6 +23,7 @@
 
 mod colour;
 pub mod exposure;
+mod fill;
 pub mod metrics;
 mod panorama;
 mod picture;
@@ -38,7 +42,10 @@ pub use veni_light::{Error, Result};
 pub use colour::{LUMINANCE, luminance};
 pub use panorama::{LOG_FLOOR, Panorama};
 pub use picture::{Picture, read_mask};
-pub use read::{DEFAULT_MAX_PIXELS, LdrPanorama, ReadOptions, Transfer, attributes};
+pub use read::{
+    Content, DEFAULT_MAX_PIXELS, LdrPanorama, METADATA, Metadata, ReadOptions, Transfer, Treatment,
+    attributes,
+};
 pub use sanitise::{Sanitised, log_reference, sanitise_values};
 pub use sheet::{Sheet, write_png};
 pub use write::{HalfRange, Precision, RADIANCE_SCALE, RowSink, WriteFormat, WriteOptions, write_rows};
