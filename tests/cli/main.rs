@@ -30,6 +30,8 @@ mod large_sets;
 #[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-data's tests use the rest of it")]
 mod onnx_file;
+#[cfg(feature = "pretrained")]
+mod pictures;
 #[cfg(feature = "learn")]
 mod prepare;
 #[cfg(feature = "learn")]

@@ -16,14 +16,18 @@
 //! | other sizes, turned, mirrored | [`Panorama::resample`], [`Panorama::turn`], [`Panorama::mirror`] |
 //! | what the model works on | [`Panorama::log`], [`Panorama::mean_log_luminance`], [`exposure`] |
 //! | to a screen | [`tonemap`], [`Sheet`] |
+//! | what large or damaged files may take | [`limits`], [`Budget`], [`memory`] |
 //! | how close two panoramas are | [`metrics`] |
 //! | EXR, `.hdr`, PNG files, whole or row by row | [`Panorama::write`], [`write_rows`] |
 
 #![forbid(unsafe_code)]
 
+mod budget;
 mod colour;
 pub mod exposure;
 mod fill;
+pub mod limits;
+pub mod memory;
 pub mod metrics;
 mod panorama;
 mod picture;
@@ -39,12 +43,13 @@ mod io_tests;
 
 pub use veni_light::{Error, Result};
 
+pub use budget::{Budget, Claim};
 pub use colour::{LUMINANCE, luminance};
 pub use panorama::{LOG_FLOOR, Panorama};
 pub use picture::{Picture, read_mask};
 pub use read::{
     Content, DEFAULT_MAX_PIXELS, LdrPanorama, METADATA, Metadata, ReadOptions, Transfer, Treatment,
-    attributes,
+    attributes, peak_bytes,
 };
 pub use sanitise::{Sanitised, log_reference, sanitise_values};
 pub use sheet::{Sheet, write_png};

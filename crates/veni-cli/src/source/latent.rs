@@ -10,7 +10,7 @@ use veni_light::latent::Latent;
 use veni_light::model::Model;
 
 use super::model::{Loaded, embedded, model};
-use crate::args::ModelArgs;
+use crate::args::{Layer, ModelArgs};
 use crate::output::{CUBE_FACES, LATENT, with_remedy};
 use crate::report::Report;
 
@@ -32,11 +32,11 @@ pub(crate) fn seeded(model: &Model, seed: u64) -> Latent {
 }
 
 /// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder.
-pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
+pub(crate) fn from_file(path: &Path, layer: &Layer, loaded: &Loaded, report: Report) -> Result<Latent> {
     let model = &loaded.model;
     let mut latent = match stored(path)? {
         Some(latent) => latent,
-        None => encode(path, loaded, report)?,
+        None => encode(path, layer, loaded, report)?,
     };
     check(&latent, loaded).with_context(|| path.display().to_string())?;
     if latent.model.is_none() {
@@ -100,9 +100,9 @@ fn inside(_: &Latent) -> Option<usize> {
     None
 }
 
-fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
+fn encode(path: &Path, layer: &Layer, loaded: &Loaded, report: Report) -> Result<Latent> {
     report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
-    super::encoding::Encoding::new(loaded)?.encode_file(path, report).map(|e| e.latent)
+    super::encoding::Encoding::new(loaded)?.encode_file(path, layer, report).map(|e| e.latent)
 }
 
 /// Whether a file is a latent, and not an image: JSON is a latent; everything else is left to the image readers, which say what

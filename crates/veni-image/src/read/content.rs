@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::decode::{Decoded, decode};
-use super::{Kind, LdrPanorama, ReadOptions, exr, hdr, kind, open};
+use super::{Kind, LdrPanorama, ReadOptions, declared, exr, hdr, kind, open, precheck};
 use crate::panorama::Panorama;
 use crate::{Error, Result};
 
@@ -25,7 +25,11 @@ impl Content {
         let path = path.as_ref();
         let read = || {
             let mut file = open(path)?;
-            Ok(match kind(&mut file, path)? {
+            let kind = kind(&mut file, path)?;
+            if !matches!(kind, Kind::Display(_)) {
+                precheck::room(declared(&mut file, path)?, options)?;
+            }
+            Ok(match kind {
                 Kind::Exr => Self::Radiance(exr::read(file, path, options)?),
                 Kind::Hdr => Self::Radiance(hdr::read(file, path, options)?),
                 Kind::Display(_) => Self::from(decode(path, options)?),
@@ -52,7 +56,11 @@ impl From<Decoded> for Content {
 /// The radiance that a file holds.
 pub(super) fn radiance(path: &Path, options: &ReadOptions) -> Result<Panorama> {
     let mut file = open(path)?;
-    match kind(&mut file, path)? {
+    let kind = kind(&mut file, path)?;
+    if !matches!(kind, Kind::Display(_)) {
+        precheck::room(declared(&mut file, path)?, options)?;
+    }
+    match kind {
         Kind::Exr => exr::read(file, path, options),
         Kind::Hdr => hdr::read(file, path, options),
         // most hold none: what is wrong with those is not asked here

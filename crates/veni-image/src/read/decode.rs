@@ -13,7 +13,7 @@ use super::display::{self, Tags};
 use super::gain_map::{self, Found, GainMap};
 use super::gpano::{Crop, Sphere};
 use super::meaning::{Curve, Meaning};
-use super::{LdrPanorama, ReadOptions, Transfer, exif, first_bytes, jpeg, ldr, open, png, unknown};
+use super::{LdrPanorama, ReadOptions, Transfer, exif, first_bytes, jpeg, ldr, open, png, precheck, unknown};
 use crate::panorama::Panorama;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
@@ -91,6 +91,7 @@ pub(super) fn decode(path: &Path, options: &ReadOptions) -> Result<Decoded> {
         ImageError::Unsupported(e) => Error::unsupported(format!("{name}: {e}")),
         other => Error::invalid(format!("damaged or truncated {name} file: {other}")),
     };
+    precheck::room(precheck::ldr(&mut file, path, format)?, options)?;
     match format {
         ImageFormat::Jpeg => {
             let mut bytes = Vec::new();
@@ -184,22 +185,45 @@ fn on_its_side(orientation: Orientation) -> bool {
     matches!(orientation, Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH)
 }
 
-/// Display values of any sample layout, and how much of each pixel is known by their alpha.
+/// Display values of any sample layout, and how much of each pixel is known by their alpha. The image is read sample by sample: a
+/// copy in a common layout would take as much memory as the values.
 fn values(grid: Equirect, image: &DynamicImage) -> (Vec<[f32; 3]>, Option<Vec<f32>>) {
+    use DynamicImage as D;
+    let byte = |v: u8| f32::from(v) / 255.0;
+    let word = |v: u16| f32::from(v) / 65535.0;
     let mut values = Vec::with_capacity(grid.len());
     let mut known = None;
     match image {
-        DynamicImage::ImageRgb8(rgb) => {
-            values.extend(rgb.pixels().map(|p| p.0.map(|v| f32::from(v) / 255.0)));
+        D::ImageLuma8(image) => values.extend(image.pixels().map(|p| [byte(p.0[0]); 3])),
+        D::ImageLuma16(image) => values.extend(image.pixels().map(|p| [word(p.0[0]); 3])),
+        D::ImageRgb8(image) => values.extend(image.pixels().map(|p| p.0.map(byte))),
+        D::ImageRgb16(image) => values.extend(image.pixels().map(|p| p.0.map(word))),
+        D::ImageLumaA8(image) => {
+            values.extend(image.pixels().map(|p| [byte(p.0[0]); 3]));
+            known = hidden(image.pixels().map(|p| p.0[1]), u8::MAX, byte);
+        }
+        D::ImageLumaA16(image) => {
+            values.extend(image.pixels().map(|p| [word(p.0[0]); 3]));
+            known = hidden(image.pixels().map(|p| p.0[1]), u16::MAX, word);
+        }
+        D::ImageRgba8(image) => {
+            values.extend(image.pixels().map(|p| [p.0[0], p.0[1], p.0[2]].map(byte)));
+            known = hidden(image.pixels().map(|p| p.0[3]), u8::MAX, byte);
         }
         other => {
             let rgba = other.to_rgba16();
-            let unit = |v: u16| f32::from(v) / 65535.0;
-            values.extend(rgba.pixels().map(|p| [p.0[0], p.0[1], p.0[2]].map(unit)));
-            if rgba.pixels().any(|p| p.0[3] < u16::MAX) {
-                known = Some(rgba.pixels().map(|p| unit(p.0[3])).collect());
-            }
+            values.extend(rgba.pixels().map(|p| [p.0[0], p.0[1], p.0[2]].map(word)));
+            known = hidden(rgba.pixels().map(|p| p.0[3]), u16::MAX, word);
         }
     }
     (values, known)
+}
+
+/// An alpha channel from 0 to 1, where it hides anything.
+fn hidden<T: PartialOrd + Copy>(
+    alpha: impl Iterator<Item = T> + Clone,
+    opaque: T,
+    unit: impl Fn(T) -> f32,
+) -> Option<Vec<f32>> {
+    alpha.clone().any(|a| a < opaque).then(|| alpha.map(unit).collect())
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use moxcms::TransferCharacteristics as Transfer;
 use moxcms::{ColorProfile, DataColorSpace, ParsingOptions, ProfileText, ToneReprCurve};
 
 use super::meaning::{Curve, Meaning};
@@ -26,7 +27,11 @@ pub(super) fn meaning(profile: &[u8]) -> Result<Meaning> {
     let profile = ColorProfile::new_from_slice_with_options(profile, options)
         .map_err(|e| Error::invalid(format!("damaged ICC profile: {e}")))?;
     let name = name(&profile);
-    if let Some(cicp) = profile.cicp {
+    // curves and matrix say the same where they can, and there are writers whose code points are wrong
+    let plain = profile.red_trc.is_some() || profile.gray_trc.is_some();
+    if let Some(cicp) = profile.cicp
+        && (!plain || matches!(cicp.transfer_characteristics, Transfer::Smpte2084 | Transfer::Hlg))
+    {
         let (primaries, transfer) = (cicp.color_primaries as u8, cicp.transfer_characteristics as u8);
         return h273(primaries, transfer, &format!("ICC profile {name:?}"));
     }

@@ -119,6 +119,24 @@ impl LdrPanorama {
         self.meaning.curve == Curve::Srgb && self.meaning.matrix.is_none()
     }
 
+    /// What the values are, in words: curve and primaries.
+    pub fn coding(&self) -> String {
+        let curve = match &self.meaning.curve {
+            Curve::Linear => "linear".to_owned(),
+            Curve::Srgb => "sRGB curve".to_owned(),
+            Curve::Power(gamma) => format!("power of {gamma:.3}"),
+            Curve::Pq => "PQ".to_owned(),
+            Curve::Hlg => "HLG".to_owned(),
+            Curve::Table(_) => "curve of an ICC profile".to_owned(),
+        };
+        let primaries = if self.meaning.matrix.is_some() {
+            "other primaries than Rec. 709"
+        } else {
+            "Rec. 709 primaries"
+        };
+        format!("{curve}, {primaries}")
+    }
+
     /// The least linear value that `value` of any channel becomes.
     pub(crate) fn linear_value(&self, value: f32) -> f32 {
         (0..3).map(|channel| self.meaning.curve.linear(channel, value)).fold(f32::INFINITY, f32::min)

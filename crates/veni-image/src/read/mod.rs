@@ -18,6 +18,7 @@ mod ldr_tests;
 mod meaning;
 mod metadata;
 mod png;
+mod precheck;
 mod spaces;
 mod xmp;
 
@@ -36,9 +37,7 @@ pub use content::Content;
 pub use ldr::{LdrPanorama, Transfer};
 pub use metadata::{METADATA, Metadata, Treatment};
 
-/// The largest panorama that [`Panorama::read`] accepts: 2²⁸ pixels (a little over 23,000 × 11,500), which is
-/// 3 GiB of radiance. [`ReadOptions::max_pixels`] overrides it.
-pub const DEFAULT_MAX_PIXELS: usize = 1 << 28;
+pub use crate::limits::DEFAULT_MAX_PIXELS;
 
 /// What [`Panorama::read_with`] accepts.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -123,7 +122,7 @@ impl Panorama {
 }
 
 /// The text attributes of an EXR file, from its header alone (no pixel is read); those of the first part where
-/// parts disagree. A Radiance file gives its `NAME=value` header lines.
+/// parts disagree. A Radiance file gives its `NAME=value` header lines, PNG, JPEG, WebP and AVIF give nothing.
 ///
 /// # Errors
 /// As [`Panorama::read_with`] where the header is concerned.
@@ -134,10 +133,40 @@ pub fn attributes(path: impl AsRef<Path>) -> Result<BTreeMap<String, String>> {
         match kind(&mut file, path)? {
             Kind::Exr => exr::attributes(file, path),
             Kind::Hdr => hdr::attributes(file, path),
-            Kind::Display(format) => Err(Error::LowRange { path: path.to_path_buf(), format }),
+            Kind::Display(_) => Ok(BTreeMap::new()),
         }
     };
     read().map_err(|e| e.in_file(path))
+}
+
+/// Bytes of memory that reading and examining a file takes at its peak, by the size that its header declares; no pixel is
+/// read. Nothing where it declares none, or more pixels than `options` allow: to read it is an error.
+///
+/// # Errors
+/// As [`Panorama::read_with`] and [`LdrPanorama::read_with`] where the header is concerned.
+pub fn peak_bytes(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Option<u64>> {
+    let path = path.as_ref();
+    let look = || Ok(precheck::peak(declared(&mut open(path)?, path)?, options));
+    look().map_err(|e: Error| e.in_file(path))
+}
+
+/// The size that the header of a file of any format declares; rewinds.
+fn declared(file: &mut (impl Read + Seek), path: &Path) -> Result<precheck::Size> {
+    let start = first_bytes(file, path)?;
+    let Some((format, _)) = ldr::format(&start) else {
+        return match kind(file, path)? {
+            Kind::Exr => precheck::exr(file, path),
+            Kind::Hdr => precheck::hdr(file, path),
+            Kind::Display(_) => Ok(None),
+        };
+    };
+    #[cfg(feature = "avif")]
+    if format == ImageFormat::Avif {
+        let size = avif::declared(&mut *file, path)?;
+        file.rewind().map_err(|e| Error::io(path, "read", e))?;
+        return Ok(Some(size));
+    }
+    precheck::ldr(file, path, format)
 }
 
 fn open(path: &Path) -> Result<BufReader<File>> {
@@ -188,12 +217,14 @@ fn first_bytes(file: &mut (impl Read + Seek), path: &Path) -> Result<Vec<u8>> {
 fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
     let start = first_bytes(file, path)?;
     if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        precheck::exr(file, path)?;
         return Ok(Kind::Exr);
     }
     if start.starts_with(b"#?") {
+        precheck::hdr(file, path)?;
         return Ok(Kind::Hdr);
     }
-    if let Some((.., format)) = LDR.iter().find(|(at, magic, ..)| stands(&start, *at, magic)) {
+    if let Some((_, format)) = ldr::format(&start) {
         return Ok(Kind::Display(format));
     }
     Err(unknown(&start, "neither an OpenEXR nor a Radiance .hdr file"))

@@ -22,7 +22,7 @@ pub(super) fn tags(file: &mut (impl BufRead + Seek)) -> Result<Tags> {
         file.read_exact(&mut head).map_err(read)?;
         let [a, b, c, d, name @ ..] = head;
         let length = u32::from_be_bytes([a, b, c, d]);
-        let wanted = matches!(&name, b"cICP" | b"gAMA" | b"cHRM" | b"sRGB" | b"acTL" | b"PLTE");
+        let wanted = matches!(&name, b"cICP" | b"gAMA" | b"cHRM" | b"sRGB" | b"acTL");
         if matches!(&name, b"IDAT" | b"IEND") {
             break;
         }
@@ -55,10 +55,6 @@ pub(super) fn tags(file: &mut (impl BufRead + Seek)) -> Result<Tags> {
             b"sRGB" => tags.srgb = true,
             b"acTL" => {
                 tags.notes.push("is animated (APNG): its still image is taken".to_owned());
-            }
-            // the decoder does not survive the others
-            b"PLTE" if length == 0 || length % 3 != 0 || length > 768 => {
-                return Err(Error::invalid(format!("damaged PNG file: a palette of {length} bytes")));
             }
             _ => {}
         }

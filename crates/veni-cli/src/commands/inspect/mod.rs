@@ -2,6 +2,7 @@
 
 #[cfg(feature = "gpu")]
 mod devices;
+mod display;
 mod facts;
 mod image;
 mod latent;
@@ -17,6 +18,7 @@ use anyhow::{Result, bail};
 use clap::Args;
 use veni_light::Error;
 
+use crate::args::Layer;
 use crate::features::{GPU, only};
 use crate::report::{self, Outcome, Report};
 use facts::Facts;
@@ -37,7 +39,7 @@ const DEVICES: &str = "\n\nWith --devices: every graphics device that could bake
     long_about = format!("Show what is inside models, latents, images and training runs.\n\n\
         Model: sizes, identity, training data, prior. Latent: vectors, lengths, exposure, the model it belongs to. \
         Image: size, storage, attributes, radiance over the sphere, dynamic range, where the sun is, the latent it \
-        was baked from. Run folder: how far it is, how good.\n\n\
+        was baked from, what is unknown of it, and what the file says that is not applied. Run folder: how far it is, how good.\n\n\
         The content decides what a file is, not its name. Radiance statistics are weighted by solid angle.{}",
         only(GPU, DEVICES)),
     after_help = format!("Examples:\n  \
@@ -53,6 +55,9 @@ pub(crate) struct Inspect {
     #[arg(value_name = "FILE")]
     files: Vec<PathBuf>,
 
+    #[command(flatten)]
+    layer: Layer,
+
     /// List the graphics devices instead, and measure and check each
     #[cfg(feature = "gpu")]
     #[arg(long, conflicts_with = "files")]
@@ -67,13 +72,13 @@ impl Inspect {
         }
         report::each(&self.files, |path| {
             let name = path.display().to_string();
-            let facts = describe(path)?;
+            let facts = describe(path, &self.layer)?;
             report.result(facts.text(&name), &facts.json("file", &name))
         })
     }
 }
 
-fn describe(path: &Path) -> Result<Facts> {
+fn describe(path: &Path, layer: &Layer) -> Result<Facts> {
     if path.is_dir() {
         return run::describe(path);
     }
@@ -86,6 +91,6 @@ fn describe(path: &Path) -> Result<Facts> {
         // safetensors: the length of a JSON header in 8 bytes, then that header
         [_, _, _, _, _, 0, 0, 0, b'{', ..] => model::describe(path),
         text if text.trim_ascii_start().starts_with(b"{") => latent::describe(path),
-        _ => image::describe(path),
+        _ => image::describe(path, layer),
     }
 }

@@ -12,7 +12,7 @@ use super::network::NetworkSettings;
 use super::record::{Facts, Fate, Record};
 use super::scan::Source;
 use super::store::Store;
-use crate::output::with_remedy;
+use crate::output::{CHOOSE_LAYER, with_remedy};
 use crate::progress::Bars;
 use crate::report::{Report, to_stderr};
 
@@ -68,7 +68,10 @@ fn fate(
     network: Option<&NetworkSettings>,
 ) -> Result<Fate> {
     let refused = |error: veni_light::Error| {
-        let text = error.with_source();
+        let text = match &error {
+            veni_light::Error::Layers { .. } => format!("{error}; {CHOOSE_LAYER}"),
+            _ => error.with_source(),
+        };
         let prefix = format!("{}: ", source.path.display());
         Fate::Refused(text.strip_prefix(&prefix).unwrap_or(&text).to_owned())
     };
@@ -80,6 +83,9 @@ fn fate(
         Ok(examined) => examined,
         Err(error) => return Ok(refused(error)),
     };
+    for note in &examined.notes {
+        to_stderr(&format!("{}: {note}\n", source.path.display()));
+    }
     let path = lock(store).waiting(&id);
     let options = WriteOptions {
         half_range: half_range(&examined),

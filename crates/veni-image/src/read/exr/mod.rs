@@ -18,14 +18,10 @@ use rayon::prelude::*;
 
 use super::ReadOptions;
 use super::meaning::Meaning;
+use crate::limits::{MAX_EXR_BLOCK_BYTES, MAX_EXR_CHANNELS, MAX_EXR_CHUNKS, MAX_EXR_PARTS, at_most};
 use crate::{Error, Result};
 use crate::{Panorama, RADIANCE_SCALE};
 use veni_light::sphere::Equirect;
-
-/// Parts, channels and tile area beyond these are no panorama but an attempt to exhaust memory.
-const MAX_PARTS: usize = 256;
-const MAX_CHANNELS: usize = 1024;
-const MAX_BLOCK_BYTES: usize = 1 << 30;
 
 pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -> Result<Panorama> {
     guarded(|| {
@@ -143,7 +139,7 @@ fn judge(header: &Header, options: &ReadOptions) -> Result<Equirect> {
     };
     let bytes =
         (block_width.checked_mul(block_height)).and_then(|n| n.checked_mul(header.channels.bytes_per_pixel));
-    if bytes.is_none_or(|n| n > MAX_BLOCK_BYTES) || block_width == 0 || block_height == 0 {
+    if bytes.is_none_or(|n| n > MAX_EXR_BLOCK_BYTES) || block_width == 0 || block_height == 0 {
         return Err(Error::invalid(format!(
             "blocks of {block_width} × {block_height} pixels are not plausible"
         )));
@@ -154,12 +150,14 @@ fn judge(header: &Header, options: &ReadOptions) -> Result<Equirect> {
 /// Every part is walked through when chunks are looked up, so each must be of a plausible size.
 fn judge_parts(headers: &[Header], options: &ReadOptions) -> Result<()> {
     let any = ReadOptions { any_aspect: true, ..options.clone() };
-    if headers.len() > MAX_PARTS || headers.iter().any(|h| h.channels.list.len() > MAX_CHANNELS) {
+    if headers.len() > MAX_EXR_PARTS || headers.iter().any(|h| h.channels.list.len() > MAX_EXR_CHANNELS) {
         return Err(Error::invalid("more parts or channels than a panorama has"));
     }
     for Vec2(width, height) in headers.iter().map(|header| header.layer_size) {
         any.check(width, height).map_err(|e| Error::invalid(format!("data window: {e}")))?;
     }
+    let chunks = headers.iter().fold(0_u64, |sum, header| sum.saturating_add(header.chunk_count as u64));
+    at_most("blocks", chunks, MAX_EXR_CHUNKS as u64)?;
     Ok(())
 }
 

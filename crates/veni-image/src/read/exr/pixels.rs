@@ -18,8 +18,9 @@ use super::wrap;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 
-/// Compressed blocks held at a time while decompressing on all cores.
+/// Blocks held at a time while decompressing on all cores, and their bytes where they are large.
 const BATCH: usize = 32;
+const BATCH_BYTES: usize = 1 << 28;
 
 /// Decompresses all blocks of the largest level and copies them to where the display window has them.
 pub(super) fn read(
@@ -43,8 +44,10 @@ pub(super) fn read(
         i64::from(header.own_attributes.layer_position.1) - i64::from(origin.1),
     ];
     let mut seen = HashSet::with_capacity(expected);
+    let together = (BATCH_BYTES / header.max_block_byte_size().max(1)).clamp(1, BATCH);
     loop {
-        let batch = chunks.by_ref().take(BATCH).collect::<Result<Vec<_>, _>>().map_err(|e| wrap(e, path))?;
+        let batch =
+            chunks.by_ref().take(together).collect::<Result<Vec<_>, _>>().map_err(|e| wrap(e, path))?;
         if batch.is_empty() {
             break;
         }
