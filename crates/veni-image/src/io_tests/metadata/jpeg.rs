@@ -72,6 +72,54 @@ fn backwards() {
     );
 }
 
+/// A JPEG of 8 × 8 in four components, baseline, each of one value (T.81): quantisation by 1, four bits for each category of a
+/// DC difference, one for the end of a block.
+fn four_components(values: [u8; 4]) -> Vec<u8> {
+    let mut bytes = vec![0xFF, 0xD8];
+    bytes.extend(segment(0xEE, b"Adobe\0\x64\0\0\0\0\0"));
+    bytes.extend(segment(0xDB, &[&[0][..], &[1; 64]].concat()));
+    let components: Vec<u8> = (1..=4).flat_map(|c| [c, 0x11, 0]).collect();
+    bytes.extend(segment(0xC0, &[&[8, 0, 8, 0, 8, 4][..], &components].concat()));
+    let counts = |length: usize, count: u8| (1..=16).map(move |l| if l == length { count } else { 0 });
+    bytes.extend(segment(0xC4, &[vec![0], counts(4, 12).collect(), (0..12).collect()].concat()));
+    bytes.extend(segment(0xC4, &[vec![0x10], counts(1, 1).collect(), vec![0]].concat()));
+    let scan: Vec<u8> = (1..=4).flat_map(|c| [c, 0]).collect();
+    bytes.extend(segment(0xDA, &[&[4][..], &scan, &[0, 63, 0]].concat()));
+    let mut bits = String::new();
+    for value in values {
+        let coefficient = 8 * (i32::from(value) - 128);
+        let size = 32 - coefficient.unsigned_abs().leading_zeros();
+        bits += &format!("{size:04b}");
+        if size > 0 {
+            let code = if coefficient > 0 { coefficient } else { coefficient + (1 << size) - 1 };
+            bits += &format!("{code:0width$b}", width = size as usize);
+        }
+        bits.push('0');
+    }
+    while bits.len() % 8 != 0 {
+        bits.push('1');
+    }
+    for byte in bits.as_bytes().chunks(8) {
+        let byte = byte.iter().fold(0, |b, bit| b << 1 | (bit - b'0'));
+        bytes.push(byte);
+        bytes.extend((byte == 0xFF).then_some(0));
+    }
+    bytes.extend([0xFF, 0xD9]);
+    bytes
+}
+
+/// As Adobe's programs store it, ink is 255 − value: red, green and blue are value × black / 255.
+#[test]
+fn cmyk_is_converted_by_the_plain_formula() {
+    for (stored, expected) in [([200, 100, 50, 255], [200, 100, 50]), ([200, 100, 50, 128], [100, 50, 25])] {
+        let file = File::new(&four_components(stored));
+        let Content::Display(ldr) = file.content().unwrap() else { panic!("display values") };
+        for (found, expected) in ldr.values()[9].iter().zip(expected) {
+            assert!((255.0 * found - expected as f32).abs() < 2.5, "{stored:?}: {:?}", ldr.values()[9]);
+        }
+    }
+}
+
 /// The header of a profile for CMYK, without tags.
 fn cmyk() {
     let mut profile = vec![0; 132];
