@@ -64,24 +64,29 @@ pub(super) fn read(file: &mut impl BufRead, layout: Layout, pixels: &mut [[f32; 
     }
     let mut row = vec![[0u8; 4]; columns];
     let mut planes = vec![0u8; 4 * columns];
+    let mut turned = vec![[0f32; 3]; columns];
     for at in 0..rows {
         let mut start = [0; 4];
         file.read_exact(&mut start)?;
-        if is_new(start, columns) {
+        let new = is_new(start, columns);
+        if new {
             new_row(file, &mut planes)?;
-            for (column, pixel) in row.iter_mut().enumerate() {
-                *pixel = [0, 1, 2, 3].map(|c| planes[c * columns + column]);
-            }
         } else {
             old_row(file, start, &mut row)?;
         }
-        if layout.is_plain() {
-            let line = &mut pixels[at * columns..][..columns];
-            line.iter_mut().zip(&row).for_each(|(to, from)| *to = radiance(*from));
+        let plain = layout.is_plain();
+        let line = if plain { &mut pixels[at * columns..][..columns] } else { &mut turned[..] };
+        if new {
+            let (reds, rest) = planes.split_at(columns);
+            let (greens, rest) = rest.split_at(columns);
+            let (blues, exponents) = rest.split_at(columns);
+            let colours = reds.iter().zip(greens).zip(blues).zip(exponents);
+            line.iter_mut().zip(colours).for_each(|(to, (((r, g), b), e))| *to = radiance([*r, *g, *b, *e]));
         } else {
-            row.iter()
-                .enumerate()
-                .for_each(|(column, from)| pixels[layout.place(at, column)] = radiance(*from));
+            line.iter_mut().zip(&row).for_each(|(to, from)| *to = radiance(*from));
+        }
+        if !plain {
+            turned.iter().enumerate().for_each(|(column, value)| pixels[layout.place(at, column)] = *value);
         }
     }
     Ok(())
