@@ -54,7 +54,7 @@ impl Panorama {
         }
         let Some(mut above) = levels.pop() else { return share };
         let whole = above.sums[0];
-        if !(whole[3] > 0.0) {
+        if whole[3] <= 0.0 {
             self.known = Some(known);
             return share;
         }
@@ -64,7 +64,7 @@ impl Panorama {
             above = level;
         }
         for ((pixel, known), [r, g, b, _]) in self.pixels.iter_mut().zip(&known).zip(&above.sums) {
-            if !(*known > 0.0) {
+            if *known <= 0.0 {
                 *pixel = [*r, *g, *b];
             }
         }

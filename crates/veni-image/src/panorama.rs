@@ -127,8 +127,7 @@ impl Panorama {
 /// Share of the pixels of which less than half is known.
 pub(crate) fn unknown_share(known: Option<&[f32]>) -> f64 {
     let Some(known) = known else { return 0.0 };
-    // NaN is unknown too
-    let hidden = known.iter().filter(|k| !(**k >= 0.5)).count();
+    let hidden = known.iter().filter(|k| **k < 0.5).count();
     hidden as f64 / known.len().max(1) as f64
 }
 

@@ -140,7 +140,7 @@ fn data() -> ReadOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use veni_image::{Precision, WriteFormat, WriteOptions};
+    use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
     use veni_light::output::Overwrite;
     use veni_light::sphere::Equirect;
 

@@ -154,7 +154,7 @@ fn mip_levels_do_not_disturb() {
         let plane = plane(&image, channel);
         let level = |shift: usize| {
             let (width, height) = ((32 >> shift).max(1), (16usize >> shift).max(1));
-            let at = |k: usize| plane[(k / width << shift).min(15) * 32 + (k % width << shift).min(31)];
+            let at = |k: usize| plane[((k / width) << shift).min(15) * 32 + ((k % width) << shift).min(31)];
             FlatSamples::F32(
                 (0..width * height).map(|k| if shift == 0 { plane[k] } else { 7.0 * at(k) }).collect(),
             )

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::decode::{Decoded, decode};
-use super::{Kind, LdrPanorama, ReadOptions, declared, exr, hdr, kind, open, precheck};
+use super::{Kind, LdrPanorama, ReadOptions, declared, exr, first_bytes, format, hdr, kind, open, precheck};
 use crate::panorama::Panorama;
 use crate::{Error, Result};
 
@@ -50,6 +50,41 @@ impl Content {
 impl From<Decoded> for Content {
     fn from(decoded: Decoded) -> Self {
         if decoded.is_high() { Self::Radiance(decoded.radiance()) } else { Self::Display(decoded.display()) }
+    }
+}
+
+impl LdrPanorama {
+    /// Whether the content of `path` is a format that [`LdrPanorama::read`] reads: a look at its first bytes.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read, [`Error::Invalid`] for a folder.
+    pub fn recognise(path: impl AsRef<Path>) -> Result<bool> {
+        let path = path.as_ref();
+        let start = open(path).and_then(|mut file| first_bytes(&mut file, path));
+        start.map(|s| format(&s).is_some()).map_err(|e| e.in_file(path))
+    }
+
+    /// Reads a PNG, JPEG, WebP or (feature `avif`) AVIF file; see [`LdrPanorama::read_with`].
+    ///
+    /// # Errors
+    /// As [`LdrPanorama::read_with`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        Self::read_with(path, &ReadOptions::default())
+    }
+
+    /// Reads a PNG, JPEG or WebP file of 8 or 16 bits, or an AVIF file (feature `avif`) of 8 to 12, grey or coloured, turned
+    /// upright where its EXIF data says so (AVIF that is to be turned is refused); the content decides the format, not the
+    /// name. What the file says of its colours (cICP, ICC profile, gAMA and cHRM, EXIF; [`METADATA`](crate::METADATA)) is
+    /// applied by [`LdrPanorama::linear`]. A part of a panorama (GPano) is placed in its full sphere, the rest unknown; what
+    /// is transparent is unknown too. Gain maps, which make the file one of high dynamic range, are left to
+    /// [`Content::read`](crate::Content::read).
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for other formats; [`Error::Invalid`] for damaged files and for sizes that `options`
+    /// refuse, before pixels are allocated; [`Error::Io`] if the file cannot be read.
+    pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
+        let path = path.as_ref();
+        decode(path, options).map(Decoded::display).map_err(|e| e.in_file(path))
     }
 }
 

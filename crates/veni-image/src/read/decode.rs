@@ -13,7 +13,7 @@ use super::display::{self, Tags};
 use super::gain_map::{self, Found, GainMap};
 use super::gpano::{Crop, Sphere};
 use super::meaning::{Curve, Meaning};
-use super::{LdrPanorama, ReadOptions, Transfer, exif, first_bytes, jpeg, ldr, open, png, precheck, unknown};
+use super::{LdrPanorama, ReadOptions, Transfer, exif, first_bytes, jpeg, open, png, precheck, unknown};
 use crate::panorama::Panorama;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
@@ -75,7 +75,7 @@ fn place(
 pub(super) fn decode(path: &Path, options: &ReadOptions) -> Result<Decoded> {
     let mut file = open(path)?;
     let start = first_bytes(&mut file, path)?;
-    let Some((format, name)) = ldr::format(&start) else {
+    let Some((format, name)) = super::format(&start) else {
         return Err(unknown(&start, "neither a PNG, a JPEG, a WebP nor an AVIF file"));
     };
     #[cfg(feature = "avif")]

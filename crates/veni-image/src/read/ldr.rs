@@ -1,14 +1,8 @@
 //! Panoramas of limited range: PNG, JPEG, WebP and AVIF, as the display values that are stored.
 
-use std::path::Path;
-
-use super::decode::{Decoded, decode};
 use super::meaning::{Curve, Meaning};
-use super::{LDR, ReadOptions, first_bytes, open, stands};
-use crate::Result;
 use crate::panorama::{Panorama, unknown_share};
 use crate::tonemap::srgb_to_linear;
-use image::ImageFormat;
 use veni_light::sphere::Equirect;
 
 /// A panorama of limited dynamic range: display values in [0, 1], as an 8- or 16-bit file has them, row-major.
@@ -54,39 +48,6 @@ impl LdrPanorama {
         assert_eq!(values.len(), grid.len(), "a {width} × {height} panorama got {} pixels", values.len());
         let values = values.into_iter().map(|p| p.map(|v| v.clamp(0.0, 1.0))).collect();
         Self { grid, values, known: None, meaning: Meaning::default() }
-    }
-
-    /// Whether the content of `path` is a format that [`LdrPanorama::read`] reads: a look at its first bytes.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if the file cannot be read, [`Error::Invalid`] for a folder.
-    pub fn recognise(path: impl AsRef<Path>) -> Result<bool> {
-        let path = path.as_ref();
-        let start = open(path).and_then(|mut file| first_bytes(&mut file, path));
-        start.map(|s| format(&s).is_some()).map_err(|e| e.in_file(path))
-    }
-
-    /// Reads a PNG, JPEG, WebP or (feature `avif`) AVIF file; see [`LdrPanorama::read_with`].
-    ///
-    /// # Errors
-    /// As [`LdrPanorama::read_with`].
-    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        Self::read_with(path, &ReadOptions::default())
-    }
-
-    /// Reads a PNG, JPEG or WebP file of 8 or 16 bits, or an AVIF file (feature `avif`) of 8 to 12, grey or coloured, turned
-    /// upright where its EXIF data says so (AVIF that is to be turned is refused); the content decides the format, not the
-    /// name. What the file says of its colours (cICP, ICC profile, gAMA and cHRM, EXIF; [`METADATA`](crate::METADATA)) is
-    /// applied by [`LdrPanorama::linear`]. A part of a panorama (GPano) is placed in its full sphere, the rest unknown; what
-    /// is transparent is unknown too. Gain maps, which make the file one of high dynamic range, are left to
-    /// [`Content::read`](crate::Content::read).
-    ///
-    /// # Errors
-    /// [`Error::Unsupported`] for other formats; [`Error::Invalid`] for damaged files and for sizes that `options`
-    /// refuse, before pixels are allocated; [`Error::Io`] if the file cannot be read.
-    pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
-        let path = path.as_ref();
-        decode(path, options).map(Decoded::display).map_err(|e| e.in_file(path))
     }
 
     /// The pixel grid.
@@ -166,12 +127,4 @@ impl LdrPanorama {
     pub fn to_rec709(&self, panorama: &mut Panorama) {
         self.meaning.to_rec709(panorama.pixels_mut());
     }
-}
-
-/// The format that these first bytes begin, with its name.
-pub(super) fn format(start: &[u8]) -> Option<(ImageFormat, &'static str)> {
-    let (.., format, name) = LDR.iter().find(|(at, magic, ..)| stands(start, *at, magic))?;
-    // RIFF holds sound and video too
-    let is_image = *format != ImageFormat::WebP || start.get(8..12) == Some(b"WEBP");
-    is_image.then_some((*format, *name))
 }

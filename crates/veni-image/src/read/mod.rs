@@ -153,7 +153,7 @@ pub fn peak_bytes(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Optio
 /// The size that the header of a file of any format declares; rewinds.
 fn declared(file: &mut (impl Read + Seek), path: &Path) -> Result<precheck::Size> {
     let start = first_bytes(file, path)?;
-    let Some((format, _)) = ldr::format(&start) else {
+    let Some((format, _)) = format(&start) else {
         return match kind(file, path)? {
             Kind::Exr => precheck::exr(file, path),
             Kind::Hdr => precheck::hdr(file, path),
@@ -193,6 +193,14 @@ const LDR: &[(usize, &[u8], ImageFormat, &str)] = &[
     (4, b"ftypavif", ImageFormat::Avif, "AVIF"),
 ];
 
+/// The format that these first bytes begin, with its name.
+fn format(start: &[u8]) -> Option<(ImageFormat, &'static str)> {
+    let (.., format, name) = LDR.iter().find(|(at, magic, ..)| stands(start, *at, magic))?;
+    // RIFF holds sound and video too
+    let is_image = *format != ImageFormat::WebP || start.get(8..12) == Some(b"WEBP");
+    is_image.then_some((*format, *name))
+}
+
 /// Formats that are not read: where the name of each stands.
 const FOREIGN: [(usize, &[u8], &str); 7] = [
     // with the feature `avif` found before
@@ -224,7 +232,7 @@ fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
         precheck::hdr(file, path)?;
         return Ok(Kind::Hdr);
     }
-    if let Some((_, format)) = ldr::format(&start) {
+    if let Some((_, format)) = format(&start) {
         return Ok(Kind::Display(format));
     }
     Err(unknown(&start, "neither an OpenEXR nor a Radiance .hdr file"))

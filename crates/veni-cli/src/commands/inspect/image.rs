@@ -4,19 +4,16 @@ use std::path::Path;
 
 use anyhow::{Result, anyhow};
 use serde_json::json;
-use veni_image::{self, LdrPanorama, Panorama};
+use veni_image::{self, Panorama};
 use veni_light::latent::Latent;
 
 use super::facts::Facts;
+use super::latent;
 use super::statistics::Statistics;
-use super::{display, latent};
 use crate::args::Layer;
 use crate::output::{CUBE_FACES, FRAME, LATENT, with_remedy};
 
 pub(super) fn describe(path: &Path, layer: &Layer) -> Result<Facts> {
-    if LdrPanorama::recognise(path)? {
-        return display::describe(path);
-    }
     let attributes = veni_image::attributes(path).map_err(with_remedy)?;
     let exr = exr_facts(path)?;
     let mut facts = Facts::new(if exr.is_some() { "OpenEXR image" } else { "Radiance HDR image" });

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
+use veni_image::LdrPanorama;
 use veni_light::Error;
 
 use crate::args::Layer;
@@ -91,6 +92,7 @@ fn describe(path: &Path, layer: &Layer) -> Result<Facts> {
         // safetensors: the length of a JSON header in 8 bytes, then that header
         [_, _, _, _, _, 0, 0, 0, b'{', ..] => model::describe(path),
         text if text.trim_ascii_start().starts_with(b"{") => latent::describe(path),
+        _ if LdrPanorama::recognise(path)? => display::describe(path),
         _ => image::describe(path, layer),
     }
 }

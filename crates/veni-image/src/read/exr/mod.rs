@@ -94,13 +94,16 @@ fn cover(panorama: &mut Panorama, data: bool) {
         panorama.known = None;
         return;
     }
-    if let (Some(alpha), false) = (&mut panorama.known, data) {
-        panorama.pixels.par_iter_mut().zip(alpha).for_each(|(pixel, alpha)| {
-            // NaN is nothing known
-            *alpha = if *alpha > 0.0 { alpha.min(1.0) } else { 0.0 };
-            *pixel = if *alpha > 0.0 { pixel.map(|v| v / *alpha) } else { [0.0; 3] };
-        });
-    }
+    let Some(alpha) = &mut panorama.known else { return };
+    panorama.pixels.par_iter_mut().zip(alpha).for_each(|(pixel, alpha)| {
+        // NaN is nothing known
+        *alpha = if *alpha > 0.0 { alpha.min(1.0) } else { 0.0 };
+        if *alpha == 0.0 {
+            *pixel = [0.0; 3];
+        } else if !data {
+            *pixel = pixel.map(|v| v / *alpha);
+        }
+    });
 }
 
 pub(super) fn attributes(file: impl Read + Seek, path: &Path) -> Result<BTreeMap<String, String>> {

@@ -51,7 +51,7 @@ pub(super) fn meaning(header: &Header, text: &BTreeMap<String, String>, coloured
     }
     let others = header.shared_attributes.other.iter().chain(&header.own_attributes.other);
     for (name, value) in others {
-        if name.to_string() == "acesImageContainerFlag" && *value == AttributeValue::I32(1) {
+        if name.as_slice() == b"acesImageContainerFlag" && *value == AttributeValue::I32(1) {
             primaries = primaries.or(Some(AP0));
         }
     }

@@ -41,7 +41,7 @@ fn meaning(header: &Header) -> Result<Meaning> {
     for value in header.all("EXPOSURE") {
         match value.trim().parse::<f32>() {
             Ok(0.0) => {
-                meaning.note("EXPOSURE=0 in the header says that the exposure is not known: taken for 1")
+                meaning.note("EXPOSURE=0 in the header says that the exposure is not known: taken for 1");
             }
             Ok(exposure) => divisors = divisors.map(|d| d * exposure),
             Err(_) => return Err(Error::invalid(format!("EXPOSURE={value} in the header is not a number"))),
