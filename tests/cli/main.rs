@@ -36,6 +36,8 @@ mod limits;
 #[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-data's tests use the rest of it")]
 mod onnx_file;
+#[cfg(feature = "pretrained")]
+mod pictures;
 #[cfg(feature = "learn")]
 mod prepare;
 #[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without the learning world"))]

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::parallel::parallel;
 use crate::pixels::Pixels;
+use crate::whole::whole;
 use crate::{Error, Result};
 use veni_image::exposure::centre_exposure;
 use veni_image::{Budget, Panorama, ReadOptions};
@@ -72,16 +73,22 @@ impl Dataset {
     /// # Errors
     /// The first file (in order) that cannot be read, by name.
     pub fn load(files: &[PathBuf], grid: Equirect) -> Result<Self> {
-        Self::load_observed(files, grid, &Silent)
+        Self::load_observed(files, grid, &ReadOptions::default(), &Silent)
     }
 
-    /// [`Dataset::load`] with an observer of its progress.
+    /// [`Dataset::load`] with limits of what is read, and an observer of its progress, who is told what files say that is not
+    /// applied.
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn load_observed(files: &[PathBuf], grid: Equirect, observer: &dyn Observer) -> Result<Self> {
+    pub fn load_observed(
+        files: &[PathBuf],
+        grid: Equirect,
+        options: &ReadOptions,
+        observer: &dyn Observer,
+    ) -> Result<Self> {
         observer.begin("panorama", "loading", 0, files.len());
-        Ok(Self::new(grid, load(files, grid, |_, item| Ok(item), observer)?))
+        Ok(Self::new(grid, load(files, grid, options, |_, item| Ok(item), observer)?))
     }
 
     /// Only the panoramas that are wanted.
@@ -124,12 +131,13 @@ impl Dataset {
 pub(super) fn load(
     files: &[PathBuf],
     grid: Equirect,
+    options: &ReadOptions,
     keep: impl Fn(usize, Item) -> Result<Item> + Sync,
     observer: &dyn Observer,
 ) -> Result<Vec<Item>> {
     parallel(files.len(), |at| {
-        let claim = Budget::shared().claim_file(&files[at], &ReadOptions::default());
-        let item = keep(at, read_item(&files[at], grid)?)?;
+        let claim = Budget::shared().claim_file(&files[at], options);
+        let item = keep(at, read_item(&files[at], grid, options, observer)?)?;
         drop(claim);
         observer.advance(1);
         Ok(item)
@@ -157,8 +165,11 @@ pub fn panorama_files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn read_item(path: &Path, grid: Equirect) -> Result<Item> {
-    let mut panorama = Panorama::read(path)?;
-    panorama.sanitise().map_err(|e| e.in_file(path))?;
+fn read_item(path: &Path, grid: Equirect, options: &ReadOptions, observer: &dyn Observer) -> Result<Item> {
+    let mut panorama = Panorama::read_with(path, options)?;
+    for note in panorama.notes() {
+        observer.note(&format!("{}: {note}", path.display()));
+    }
+    whole(&mut panorama).and_then(|()| panorama.sanitise()).map_err(|e| e.in_file(path))?;
     Ok(Item::new(path, &panorama, grid))
 }

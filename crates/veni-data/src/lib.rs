@@ -16,6 +16,7 @@ pub mod prepare;
 mod reconstruction;
 mod splits;
 mod store;
+mod whole;
 
 pub use veni_light::{Error, Result};
 

@@ -6,8 +6,11 @@
 //!
 //! | step | here |
 //! |---|---|
+//! | a file of any format | [`Content`] |
 //! | OpenEXR and Radiance `.hdr` files | [`Panorama::read`], [`Panorama::read_with`], [`attributes`] |
 //! | PNG, JPEG, WebP, and radiance from them | [`LdrPanorama`] |
+//! | what files say of their numbers | [`METADATA`] |
+//! | what is unknown of a panorama | [`Panorama::known`], [`Panorama::fill`] |
 //! | pictures of any shape, masks | [`Picture`], [`read_mask`] |
 //! | NaN, infinite, negative values | [`Panorama::sanitise`] |
 //! | other sizes, turned, mirrored | [`Panorama::resample`], [`Panorama::turn`], [`Panorama::mirror`] |
@@ -24,6 +27,7 @@ mod colour;
 pub mod engine;
 mod equal_area;
 pub mod exposure;
+mod fill;
 pub mod limits;
 pub mod memory;
 pub mod metrics;
@@ -51,7 +55,10 @@ pub use colour::{LUMINANCE, luminance};
 pub use panorama::{LOG_FLOOR, Panorama};
 pub use picture::{Picture, read_mask};
 pub use provenance::{PIXEL_DIGEST, Provenance};
-pub use read::{DEFAULT_MAX_PIXELS, LdrPanorama, ReadOptions, Transfer, attributes, peak_bytes};
+pub use read::{
+    Content, DEFAULT_MAX_PIXELS, LdrPanorama, METADATA, Metadata, ReadOptions, Transfer, Treatment,
+    attributes, peak_bytes,
+};
 pub use sanitise::{Sanitised, log_reference, sanitise_values};
 pub use sheet::{Sheet, write_png};
 pub use write::{

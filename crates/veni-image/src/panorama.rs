@@ -22,6 +22,9 @@ pub struct Panorama {
     pub(crate) pixels: Vec<[f32; 3]>,
     pub(crate) attributes: BTreeMap<String, String>,
     pub(crate) provenance: Provenance,
+    /// How much of each pixel is known, 0 to 1, unless all of all is.
+    pub(crate) known: Option<Vec<f32>>,
+    pub(crate) notes: Vec<String>,
 }
 
 impl Panorama {
@@ -32,7 +35,14 @@ impl Panorama {
     pub fn new(grid: Equirect, pixels: Vec<[f32; 3]>) -> Self {
         let Equirect { width, height } = grid;
         assert_eq!(pixels.len(), grid.len(), "a {width} × {height} panorama got {} pixels", pixels.len());
-        Self { grid, pixels, attributes: BTreeMap::new(), provenance: Provenance::Unrecorded }
+        Self {
+            grid,
+            pixels,
+            attributes: BTreeMap::new(),
+            provenance: Provenance::Unrecorded,
+            known: None,
+            notes: Vec::new(),
+        }
     }
 
     /// A panorama from natural-log radiance, the inverse of [`Panorama::log`] up to [`Panorama::log_floor`].
@@ -97,6 +107,22 @@ impl Panorama {
         self.provenance
     }
 
+    /// How much of each pixel is known, 0 to 1, row-major; `None` if all of all. What is transparent in its file, or lies
+    /// outside of the part that the file holds, is unknown; its radiance is 0 until [`Panorama::fill`].
+    pub fn known(&self) -> Option<&[f32]> {
+        self.known.as_deref()
+    }
+
+    /// Share of the pixels (0 to 1) of which less than half is known.
+    pub fn unknown(&self) -> f64 {
+        unknown_share(self.known.as_deref())
+    }
+
+    /// What its file says that is not applied, or is worth knowing; sentences without the file's name.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     /// For readers, as soon as attributes and the values as they are stored are there.
     pub(crate) fn note_provenance(&mut self) {
         self.provenance = Provenance::of(&self.attributes, self.grid, &self.pixels);
@@ -138,6 +164,13 @@ impl Panorama {
             *pixel = pixel.map(|v| v * factor);
         }
     }
+}
+
+/// Share of the pixels of which less than half is known.
+pub(crate) fn unknown_share(known: Option<&[f32]>) -> f64 {
+    let Some(known) = known else { return 0.0 };
+    let hidden = known.iter().filter(|k| **k < 0.5).count();
+    hidden as f64 / known.len().max(1) as f64
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use veni_image::{HALF_RANGE, Precision, WriteFormat, WriteOptions};
 use veni_light::latent::Latent;
 use veni_light::output::Overwrite;
 
-use crate::args::{Decoding, Force};
+use crate::args::{Decoding, Force, Layer};
 use crate::device::Device;
 use crate::features::{GPU, only};
 use crate::output::{self, with_remedy};
@@ -94,6 +94,9 @@ pub(crate) struct Bake {
     frame: Option<FrameName>,
 
     #[command(flatten)]
+    layer: Layer,
+
+    #[command(flatten)]
     decoding: Decoding,
 
     #[command(flatten)]
@@ -129,7 +132,7 @@ impl Bake {
     ) -> Result<()> {
         let overwrite = Overwrite::from(self.force);
         let named = match &job.sky {
-            Sky::File(path) => source::from_file(path, loaded, report)?,
+            Sky::File(path) => source::from_file(path, &self.layer, loaded, report)?,
             Sky::Seed(seed) => source::seeded(&loaded.model, *seed),
         };
         let latent = self.change.of(&named);

@@ -16,7 +16,7 @@ use veni_light::output::Overwrite;
 use veni_light::progress::Observer;
 use veni_light::sphere::Equirect;
 
-use crate::args::{Decoding, Force};
+use crate::args::{Decoding, Force, Layer};
 use crate::numbers::{finite, positive};
 use crate::output::with_remedy;
 use crate::progress::Bars;
@@ -85,6 +85,9 @@ pub(crate) struct Ibl {
     /// Width, or width x height, of the panorama that backgrounds and path tracers get [default: the panorama's own; 2048 of a latent]
     #[arg(long, value_name = "W|WxH")]
     sky_size: Option<Size>,
+
+    #[command(flatten)]
+    layer: Layer,
 
     #[command(flatten)]
     decoding: Decoding,
@@ -182,6 +185,7 @@ impl Ibl {
             self.seed,
             sky_grid.map(|grid| grid.width),
             &self.decoding,
+            &self.layer,
             report,
         )?;
         let mut split = self.split(panorama)?;

@@ -16,10 +16,9 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use veni_data::prepare::{PrepareConfig, Shares};
-use veni_image::ReadOptions;
 use veni_light::sphere::Equirect;
 
-use crate::args::Force;
+use crate::args::{Force, Layer};
 use crate::features::{LEARN, only};
 use crate::report::{Outcome, Report};
 use crate::shard::Shard;
@@ -89,6 +88,9 @@ pub(crate) struct Prepare {
     resplit: bool,
 
     #[command(flatten)]
+    layer: Layer,
+
+    #[command(flatten)]
     expand: Expand,
 
     #[command(flatten)]
@@ -108,9 +110,8 @@ impl Prepare {
             bail!("--val {} and --test {} leave nothing to train on: give less", self.val, self.test);
         }
         let (expand, network) = self.expand.expander()?;
-        let settings = Settings::new(width, height, expand.as_ref(), network);
-        let config =
-            PrepareConfig { grid: Equirect::new(width, height), expand, read: ReadOptions::default() };
+        let settings = Settings::new(width, height, expand.as_ref(), network).of_layer(&self.layer);
+        let config = PrepareConfig { grid: Equirect::new(width, height), expand, read: self.layer.options() };
         let found = scan::scan(&self.inputs, &self.output)?;
         if found.sources.is_empty() {
             bail!("{}: no image files in there; name a folder that has some", scan::names(&self.inputs));

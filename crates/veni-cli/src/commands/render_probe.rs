@@ -16,7 +16,7 @@ use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
 use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
 
-use crate::args::{Force, ModelArgs};
+use crate::args::{Force, Layer, ModelArgs};
 use crate::numbers::{albedo, elevation, finite, fraction, lights, shininess};
 use crate::output::{self, CAMERA, MATERIAL, with_remedy};
 use crate::report::{self, Outcome, Report};
@@ -114,6 +114,9 @@ pub(crate) struct RenderProbe {
     lights: usize,
 
     #[command(flatten)]
+    layer: Layer,
+
+    #[command(flatten)]
     model: ModelArgs,
 
     #[command(flatten)]
@@ -144,7 +147,7 @@ impl RenderProbe {
         let started = Instant::now();
         let (turn, grid) = (self.change.turn.to_radians(), scene.grid);
         let light = match &job.sky {
-            Sky::File(path) => light::from_file(path, &self.model, grid, turn, report)?,
+            Sky::File(path) => light::from_file(path, &self.layer, &self.model, grid, turn, report)?,
             Sky::Seed(seed) => light::seeded(*seed, &self.model, grid, turn)?,
         };
         let factor = self.change.exposure.exp2() as f32;

@@ -22,6 +22,10 @@ impl Observer for Bars {
     fn advance(&self, units: usize) {
         self.add(units as u64);
     }
+
+    fn note(&self, sentence: &str) {
+        Self::note(self, sentence);
+    }
 }
 
 #[cfg(feature = "learn")]

@@ -11,7 +11,7 @@ use veni_light::model::Model;
 
 use super::model::{Loaded, embedded, model};
 use super::remembered::is_of_its_pixels;
-use crate::args::ModelArgs;
+use crate::args::{Layer, ModelArgs};
 use crate::output::{CUBE_FACES, LATENT, with_remedy};
 use crate::report::Report;
 
@@ -34,13 +34,13 @@ pub(crate) fn seeded(model: &Model, seed: u64) -> Latent {
 
 /// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder. An image whose
 /// pixels are no longer those of its latent is encoded.
-pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
+pub(crate) fn from_file(path: &Path, layer: &Layer, loaded: &Loaded, report: Report) -> Result<Latent> {
     let model = &loaded.model;
     let mut latent = match stored(path)? {
         Some(latent) => latent,
         None => {
             report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
-            encode(path, loaded, report)?
+            encode(path, layer, loaded, report)?
         }
     };
     check(&latent, loaded).with_context(|| path.display().to_string())?;
@@ -56,7 +56,7 @@ pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<
             "{}: its pixels were changed after its latent was written; encoding the panorama",
             path.display()
         ));
-        latent = encode(path, loaded, report)?;
+        latent = encode(path, layer, loaded, report)?;
     }
     if latent.model.is_none() {
         report.note(format_args!(
@@ -123,8 +123,8 @@ fn is_cube_map(path: &Path) -> Result<bool> {
     Ok(veni_image::attributes(path).map_err(with_remedy)?.contains_key(CUBE_FACES))
 }
 
-fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
-    super::encoding::Encoding::new(loaded)?.encode_file(path, report).map(|e| e.latent)
+fn encode(path: &Path, layer: &Layer, loaded: &Loaded, report: Report) -> Result<Latent> {
+    super::encoding::Encoding::new(loaded)?.encode_file(path, layer, report).map(|e| e.latent)
 }
 
 /// Whether a file is a latent, and not an image: JSON is a latent; everything else is left to the image readers, which say what

@@ -1,6 +1,7 @@
 //! Files: round trips, files of other software's habits, poisoned files, random damage.
 
 mod foreign;
+mod metadata;
 mod poisoned;
 mod remembered;
 mod round_trips;

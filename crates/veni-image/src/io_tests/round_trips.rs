@@ -161,9 +161,8 @@ fn hdr_exposure_and_signature() {
         let image = Panorama::read(&path).unwrap();
         assert_eq!(image.pixels(), [[0.125, 0.0625, 0.031_25], [0.125; 3]]);
     }
-    let xyz = b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 2\n12345678";
-    fs::write(&path, xyz).unwrap();
-    assert!(matches!(Panorama::read(&path), Err(Error::Unsupported(_))));
+    fs::write(&path, b"#?RADIANCE\nFORMAT=32-bit_rle_abcd\n\n-Y 1 +X 2\n12345678").unwrap();
+    assert!(matches!(Panorama::read(&path), Err(Error::Unsupported(m)) if m.contains("32-bit_rle_abcd")));
 }
 
 #[test]

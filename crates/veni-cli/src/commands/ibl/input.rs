@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use veni_image::Panorama;
 use veni_light::sphere::Equirect;
 
-use crate::args::Decoding;
+use crate::args::{Decoding, Layer};
 use crate::device::Device;
 use crate::output::{CUBE_FACES, with_remedy};
 use crate::report::Report;
@@ -21,6 +21,7 @@ pub(super) fn radiance(
     seed: Option<u64>,
     width: Option<usize>,
     decoding: &Decoding,
+    layer: &Layer,
     report: Report,
 ) -> Result<Panorama> {
     if let Some(path) = input
@@ -30,12 +31,12 @@ pub(super) fn radiance(
         if attributes.contains_key(CUBE_FACES) {
             bail!("{}: a cube map is not a panorama; name an equirectangular image", path.display());
         }
-        return source::panorama(path, report);
+        return source::panorama(path, layer, report);
     }
     let loaded = source::model_of(&decoding.model, input)?;
     loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
     let latent = match input {
-        Some(path) => source::from_file(path, &loaded, report)?,
+        Some(path) => source::from_file(path, layer, &loaded, report)?,
         None => source::seeded(&loaded.model, seed.unwrap_or_default()),
     };
     let width = width.unwrap_or(WIDTH);

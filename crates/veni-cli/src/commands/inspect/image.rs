@@ -10,9 +10,10 @@ use veni_light::latent::Latent;
 use super::facts::Facts;
 use super::latent;
 use super::statistics::Statistics;
+use crate::args::Layer;
 use crate::output::{CAMERA, CUBE_FACES, FRAME, LATENT, with_remedy};
 
-pub(super) fn describe(path: &Path) -> Result<Facts> {
+pub(super) fn describe(path: &Path, layer: &Layer) -> Result<Facts> {
     let attributes = veni_image::attributes(path).map_err(with_remedy)?;
     let exr = exr_facts(path)?;
     let mut facts = Facts::new(if exr.is_some() { "OpenEXR image" } else { "Radiance HDR image" });
@@ -40,13 +41,13 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     }
     // a rendered picture is no panorama
     if !cube && !attributes.contains_key(CAMERA) {
-        radiance(path, &mut facts)?;
+        radiance(Panorama::read_with(path, &layer.options()).map_err(with_remedy)?, path, &mut facts)?;
     }
     Ok(facts)
 }
 
-fn radiance(path: &Path, facts: &mut Facts) -> Result<()> {
-    let mut image = Panorama::read(path)?;
+/// What the pixels say.
+pub(super) fn radiance(mut image: Panorama, path: &Path, facts: &mut Facts) -> Result<()> {
     let grid = image.grid();
     if !facts.has("size") {
         facts.add("size", format!("{} x {}", grid.width, grid.height), json!([grid.width, grid.height]));
@@ -60,6 +61,8 @@ fn radiance(path: &Path, facts: &mut Facts) -> Result<()> {
             "changed",
         ),
     }
+    reservations(image.notes(), image.unknown(), facts);
+    image.fill();
     let bad = image.sanitise().map_err(|e| e.in_file(path))?;
     if bad.total() > 0 {
         facts.add(
@@ -92,6 +95,14 @@ fn radiance(path: &Path, facts: &mut Facts) -> Result<()> {
         }),
     );
     Ok(())
+}
+
+/// What is unknown, and what the file says besides.
+pub(super) fn reservations(notes: &[String], unknown: f64, facts: &mut Facts) {
+    if unknown > 0.0 {
+        facts.add("unknown", format!("{:.1} % of the pixels", 100.0 * unknown), unknown);
+    }
+    facts.notes(notes);
 }
 
 struct Exr {

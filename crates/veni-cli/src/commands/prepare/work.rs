@@ -12,10 +12,9 @@ use super::network::NetworkSettings;
 use super::record::{Facts, Fate, Record};
 use super::scan::Source;
 use super::store::Store;
-use crate::output::with_remedy;
+use crate::output::{CHOOSE_LAYER, with_remedy};
 use crate::progress::Bars;
 use crate::report::{Report, to_stderr};
-use crate::source::stale_scale;
 
 /// The brightest value that is written without a factor, with room for rounding.
 const BRIGHTEST: f32 = 60_000.0;
@@ -67,7 +66,10 @@ fn fate(
     network: Option<&NetworkSettings>,
 ) -> Result<Fate> {
     let refused = |error: veni_light::Error| {
-        let text = error.with_source();
+        let text = match &error {
+            veni_light::Error::Layers { .. } => format!("{error}; {CHOOSE_LAYER}"),
+            _ => error.with_source(),
+        };
         let prefix = format!("{}: ", source.path.display());
         Fate::Refused(text.strip_prefix(&prefix).unwrap_or(&text).to_owned())
     };
@@ -79,8 +81,8 @@ fn fate(
         Ok(examined) => examined,
         Err(error) => return Ok(refused(error)),
     };
-    if let Some(remark) = stale_scale(&examined.panorama) {
-        to_stderr(&format!("{}: {remark}\n", source.path.display()));
+    for note in &examined.notes {
+        to_stderr(&format!("{}: {note}\n", source.path.display()));
     }
     let path = lock(store).waiting(&id);
     let (precision, half_range) = storage(&examined.panorama);

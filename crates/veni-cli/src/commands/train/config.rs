@@ -29,6 +29,9 @@ impl Train {
         if !self.data.is_empty() {
             config.data.folders = self.data.clone();
         }
+        if self.layer.is_some() {
+            config.data.layer.clone_from(&self.layer);
+        }
         if let Some(fold) = self.fold {
             config.data.fold = Some(fold);
         }

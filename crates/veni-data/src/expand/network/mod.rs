@@ -184,8 +184,10 @@ pub(super) fn expand_by(
     let grid = options.seen(ldr.grid(), network);
     let shown = match (options.input, options.transfer) {
         (NetworkInput::Linear, _) => linear.clone(),
-        (NetworkInput::Srgb, Transfer::Srgb) => Panorama::new(ldr.grid(), ldr.values().to_vec()),
-        (NetworkInput::Srgb, Transfer::Gamma(_)) => {
+        (NetworkInput::Srgb, Transfer::Srgb) if ldr.is_srgb() => {
+            Panorama::new(ldr.grid(), ldr.values().to_vec())
+        }
+        (NetworkInput::Srgb, _) => {
             Panorama::new(ldr.grid(), linear.pixels().iter().map(|p| p.map(tonemap::srgb)).collect())
         }
     };

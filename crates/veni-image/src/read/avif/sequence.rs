@@ -146,7 +146,7 @@ fn coding(bits: &mut Bits<'_>, profile: u32) -> Option<Coding> {
     // sRGB in green, blue and red has no flag of its range
     let identity = !grey && [primaries, transfer, matrix] == [1, 13, 0];
     let full_range = if identity { true } else { bits.flag()? };
-    Some(Coding { transfer, matrix, full_range })
+    Some(Coding { primaries, transfer, matrix, full_range })
 }
 
 /// Bits of a stream, the highest of a byte first.
