@@ -32,7 +32,7 @@ pub struct Target {
     /// Small inputs that are read without an error.
     pub seeds: fn() -> Vec<Vec<u8>>,
     /// Mends what every mutation breaks, checksums, so that what lies behind them is reached.
-    pub repair: fn(&mut Vec<u8>),
+    pub repair: fn(&mut [u8]),
 }
 
 /// All targets that the features of this build have.
@@ -57,7 +57,7 @@ pub fn target(name: &str) -> Target {
 }
 
 /// Leaves checksums as they are.
-fn untouched(_: &mut Vec<u8>) {}
+fn untouched(_: &mut [u8]) {}
 
 /// Runs a target by its name on bytes: what the libFuzzer binaries call.
 pub fn run(name: &str, data: &[u8]) {
