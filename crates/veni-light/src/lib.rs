@@ -53,5 +53,6 @@ pub mod output;
 pub mod progress;
 pub mod random;
 pub mod sphere;
+mod tasks;
 
 pub use error::{Error, Result};

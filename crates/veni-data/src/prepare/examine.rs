@@ -150,7 +150,8 @@ fn check_values(panorama: &Panorama) -> Result<()> {
     let count = panorama.pixels().len() as f64;
     let share =
         |f: &dyn Fn(&[f32; 3]) -> bool| panorama.pixels().iter().filter(|p| f(p)).count() as f64 / count;
-    let broken = share(&|p| p.iter().any(|v| !v.is_finite() || *v < -1.0));
+    let negative = -panorama.unit();
+    let broken = share(&|p| p.iter().any(|v| !v.is_finite() || *v < negative));
     if broken > BROKEN {
         return Err(Error::invalid(format!(
             "{:.0} % of its pixels are not numbers, infinite or negative",

@@ -19,8 +19,9 @@ use rayon::prelude::*;
 use super::ReadOptions;
 use crate::colour::{Primaries, convert};
 use crate::limits::{MAX_EXR_BLOCK_BYTES, MAX_EXR_CHANNELS, MAX_EXR_CHUNKS, MAX_EXR_PARTS, at_most};
+use crate::numbered::join;
 use crate::{Error, Result};
-use crate::{Panorama, RADIANCE_SCALE};
+use crate::{Panorama, Provenance, RADIANCE_SCALE};
 
 /// Blocks held at a time while decompressing on all cores, and their bytes where they are large.
 const BATCH: usize = 32;
@@ -43,10 +44,13 @@ pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -
         let mut panorama = Panorama::new(grid, vec![[0.0; 3]; grid.len()]);
         panorama.attributes = text(&header);
         blocks(reader, path, &choice, &header, &mut panorama)?;
+        panorama.note_provenance();
         if let Some(matrix) = matrix.filter(|_| choice.coloured) {
             panorama.pixels.par_iter_mut().for_each(|pixel| *pixel = convert(&matrix, *pixel));
         }
-        if let Some(factor) = panorama.attributes.get(RADIANCE_SCALE) {
+        if let Some(factor) =
+            panorama.attributes.get(RADIANCE_SCALE).filter(|_| panorama.provenance != Provenance::Changed)
+        {
             let factor = factor.parse().ok().filter(|f: &f32| f.is_normal() && *f > 0.0);
             let factor = factor
                 .ok_or_else(|| Error::invalid(format!("attribute {RADIANCE_SCALE} is not a factor")))?;
@@ -325,7 +329,7 @@ fn text(header: &Header) -> BTreeMap<String, String> {
             all.insert(name.to_owned(), utf8(value));
         }
     }
-    all
+    join(all)
 }
 
 /// EXR text is bytes without an encoding.

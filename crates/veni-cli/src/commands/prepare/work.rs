@@ -4,8 +4,8 @@ use std::sync::Mutex;
 
 use anyhow::Result;
 use veni_data::parallel::parallel;
-use veni_data::prepare::{Examined, PrepareConfig, content_hash, examine};
-use veni_image::{Budget, HalfRange, Panorama, Precision, WriteFormat, WriteOptions};
+use veni_data::prepare::{PrepareConfig, content_hash, examine};
+use veni_image::{Budget, HALF_ERROR, HalfRange, Panorama, Precision, WriteFormat, WriteOptions, half_error};
 use veni_light::output::Overwrite;
 
 use super::network::NetworkSettings;
@@ -15,6 +15,7 @@ use super::store::Store;
 use crate::output::with_remedy;
 use crate::progress::Bars;
 use crate::report::{Report, to_stderr};
+use crate::source::stale_scale;
 
 /// The brightest value that is written without a factor, with room for rounding.
 const BRIGHTEST: f32 = 60_000.0;
@@ -78,24 +79,62 @@ fn fate(
         Ok(examined) => examined,
         Err(error) => return Ok(refused(error)),
     };
+    if let Some(remark) = stale_scale(&examined.panorama) {
+        to_stderr(&format!("{}: {remark}\n", source.path.display()));
+    }
     let path = lock(store).waiting(&id);
+    let (precision, half_range) = storage(&examined.panorama);
     let options = WriteOptions {
-        half_range: half_range(&examined),
+        half_range,
         overwrite: Overwrite::Replace,
-        ..WriteOptions::new(WriteFormat::Exr(Precision::Half))
+        ..WriteOptions::new(WriteFormat::Exr(precision))
     };
     examined.panorama.write(&path, &options).map_err(with_remedy)?;
     Ok(Fate::Fit(Box::new(Facts::new(id, &examined, network))))
 }
 
 /// Half precision holds values from 6e-5 to 65,504 with full precision; panoramas in other units are scaled by a power of
-/// two, which the file records and readers divide out.
-fn half_range(examined: &Examined) -> HalfRange {
-    let brightest = |p: &Panorama| p.pixels().as_flattened().iter().fold(0f32, |a, b| a.max(*b));
-    let (top, mean) = (brightest(&examined.panorama), examined.panorama.mean_log_luminance().exp());
+/// two, which the file records and readers divide out. What is wider than half precision is written as floats.
+fn storage(panorama: &Panorama) -> (Precision, HalfRange) {
+    let factor = factor(panorama);
+    let keeps = |factor: f32| half_error(panorama.pixels(), factor) <= HALF_ERROR;
+    if keeps(factor) {
+        return (Precision::Half, HalfRange::Factor(factor));
+    }
+    let brightest = (BRIGHTEST / brightest(panorama)).log2().floor().exp2();
+    if keeps(brightest) {
+        return (Precision::Half, HalfRange::Factor(brightest));
+    }
+    (Precision::Float, HalfRange::Refuse)
+}
+
+fn factor(panorama: &Panorama) -> f32 {
+    let (top, mean) = (brightest(panorama), panorama.mean_log_luminance().exp());
     if top <= BRIGHTEST && mean >= DARKEST {
-        return HalfRange::Refuse;
+        return 1.0;
     }
     let wanted = if mean < DARKEST { -mean.log2() } else { f32::INFINITY };
-    HalfRange::Factor(wanted.min((BRIGHTEST / top).log2()).floor().exp2())
+    wanted.min((BRIGHTEST / top).log2()).floor().exp2()
+}
+
+fn brightest(panorama: &Panorama) -> f32 {
+    panorama.pixels().as_flattened().iter().fold(0f32, |a, b| a.max(*b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use veni_light::sphere::Equirect;
+
+    #[test]
+    fn storage_keeps_both_ends() {
+        let of = |values: [f32; 3]| storage(&Panorama::new(Equirect::new(2, 1), vec![[1.0; 3], values]));
+        let half = |factor| (Precision::Half, HalfRange::Factor(factor));
+        assert_eq!(of([0.5, 2.0, 50_000.0]), half(1.0));
+        assert_eq!(of([0.5, 2.0, 100_000.0]), half(0.5));
+        assert_eq!(of([0.5, 2.0, 1e-3]), half(1.0));
+        // one dark value in six: there is room above
+        assert_eq!(of([0.5, 2.0, 1e-7]), half(16384.0));
+        assert_eq!(of([0.5, 20_000.0, 1e-7]), (Precision::Float, HalfRange::Refuse));
+    }
 }
