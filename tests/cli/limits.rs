@@ -41,7 +41,7 @@ fn checked(_: &Dir, run: &Run, bad: &str, words: &[&str]) {
 
 fn chunk(name: &[u8; 4], body: &[u8]) -> Vec<u8> {
     let crc = !name.iter().chain(body).fold(u32::MAX, |sum, byte| {
-        (0..8).fold(sum ^ u32::from(*byte), |sum, _| sum >> 1 ^ (sum & 1) * 0xEDB8_8320)
+        (0..8).fold(sum ^ u32::from(*byte), |sum, _| (sum >> 1) ^ ((sum & 1) * 0xEDB8_8320))
     });
     [&(body.len() as u32).to_be_bytes()[..], name, body, &crc.to_be_bytes()].concat()
 }

@@ -29,8 +29,10 @@ fn options() -> ReadOptions {
 }
 
 fn panorama(path: &Path) -> bool {
-    let read = Panorama::read_with(path, &options()).and_then(|mut panorama| panorama.sanitise());
-    let _ = Panorama::read_alpha(path, &options());
+    let read = Panorama::read_with(path, &options()).and_then(|mut panorama| {
+        panorama.fill();
+        panorama.sanitise()
+    });
     read.is_ok()
 }
 
@@ -177,7 +179,7 @@ fn masks() -> Vec<Vec<u8>> {
 }
 
 /// The checksums of a PNG's chunks.
-fn checksums(file: &mut Vec<u8>) {
+fn checksums(file: &mut [u8]) {
     let mut at = 8;
     while let Some(length) =
         file.get(at..at + 4).and_then(|b| b.first_chunk()).map(|b| u32::from_be_bytes(*b))
@@ -195,6 +197,6 @@ fn checksums(file: &mut Vec<u8>) {
 /// CRC-32 (ISO 3309), bit by bit.
 fn crc(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |sum, byte| {
-        (0..8).fold(sum ^ u32::from(*byte), |sum, _| sum >> 1 ^ (sum & 1) * 0xEDB8_8320)
+        (0..8).fold(sum ^ u32::from(*byte), |sum, _| (sum >> 1) ^ ((sum & 1) * 0xEDB8_8320))
     })
 }

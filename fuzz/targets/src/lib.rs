@@ -32,7 +32,7 @@ pub struct Target {
     /// Small inputs that are read without an error.
     pub seeds: fn() -> Vec<Vec<u8>>,
     /// Mends what every mutation breaks, checksums, so that what lies behind them is reached.
-    pub repair: fn(&mut Vec<u8>),
+    pub repair: fn(&mut [u8]),
 }
 
 /// All targets that the features of this build have.
@@ -57,14 +57,15 @@ pub fn target(name: &str) -> Target {
 }
 
 /// Leaves checksums as they are.
-fn untouched(_: &mut Vec<u8>) {}
+fn untouched(_: &mut [u8]) {}
 
 /// Runs a target by its name on bytes: what the libFuzzer binaries call.
 pub fn run(name: &str, data: &[u8]) {
     (target(name).run)(&on_disk(data));
 }
 
-/// Writes the input to the one file of this thread, below `VENI_FUZZ_DIR` if that is set. It is there after an abort too.
+/// Writes the input to the one file of this thread, below `VENI_FUZZ_DIR` or, where that is not
+/// set, in memory. It is there after an abort too.
 ///
 /// # Panics
 /// If it cannot be written.
@@ -75,7 +76,9 @@ pub fn on_disk(data: &[u8]) -> PathBuf {
     PLACE.with(|place| {
         let mut place = place.borrow_mut();
         let folder = place.get_or_insert_with(|| {
-            let parent = std::env::var_os("VENI_FUZZ_DIR").map_or_else(std::env::temp_dir, PathBuf::from);
+            let memory = || Some(PathBuf::from("/dev/shm")).filter(|path| path.is_dir());
+            let parent = std::env::var_os("VENI_FUZZ_DIR").map(PathBuf::from).or_else(memory);
+            let parent = parent.unwrap_or_else(std::env::temp_dir);
             tempfile::tempdir_in(parent).expect("a folder for the input")
         });
         let path = folder.path().join("input");

@@ -42,7 +42,7 @@ fn fuzz(target: &Target, seconds: u64, seed: u64, keep: Option<PathBuf>) -> Valu
     inputs.iter().for_each(|data| tally.run(target, data, Some(&clock), keep.as_deref()));
     let mut mutator = Mutator::new(seed, inputs);
     while Instant::now() < end {
-        let mut data = mutator.next();
+        let mut data = mutator.mutation();
         (target.repair)(&mut data);
         tally.run(target, &data, Some(&clock), keep.as_deref());
     }

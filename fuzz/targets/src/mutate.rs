@@ -24,7 +24,7 @@ impl Mutator {
     }
 
     /// One of the inputs with one to eight changes.
-    pub fn next(&mut self) -> Vec<u8> {
+    pub fn mutation(&mut self) -> Vec<u8> {
         let pick = self.below(self.inputs.len());
         let mut data = self.inputs[pick].clone();
         for _ in 0..=self.below(8) {
@@ -100,7 +100,7 @@ mod tests {
     fn the_same_seed_gives_the_same_inputs_and_they_differ() {
         let make = |seed| {
             let mut mutator = Mutator::new(seed, vec![b"the quick brown fox".to_vec(), vec![7; 100]]);
-            (0..200).map(|_| mutator.next()).collect::<Vec<_>>()
+            (0..200).map(|_| mutator.mutation()).collect::<Vec<_>>()
         };
         assert_eq!(make(1), make(1));
         assert_ne!(make(1), make(2));

@@ -27,7 +27,7 @@ fn replay(target: &Target) -> Tally {
         if begin.elapsed() > Duration::from_secs_f64(SECONDS) {
             break;
         }
-        let mut data = mutator.next();
+        let mut data = mutator.mutation();
         (target.repair)(&mut data);
         tally.run(target, &data, Some(&clock), None);
     }
