@@ -30,9 +30,14 @@ mod large_sets;
 #[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-data's tests use the rest of it")]
 mod onnx_file;
+mod outside;
+#[cfg(feature = "pretrained")]
+mod pipes;
 #[cfg(feature = "learn")]
 mod prepare;
-#[cfg(feature = "learn")]
+#[cfg(feature = "pretrained")]
+mod promises;
+#[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without the learning world"))]
 mod readers;
 #[cfg(feature = "learn")]
 mod render_probe;
@@ -40,6 +45,8 @@ mod render_probe;
 mod shards;
 #[cfg(feature = "learn")]
 mod synth;
+#[cfg(all(unix, feature = "pretrained"))]
+mod terminal;
 #[cfg(feature = "learn")]
 mod train_devices;
 #[cfg(feature = "learn")]

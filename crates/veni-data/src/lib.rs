@@ -8,6 +8,7 @@ pub mod coarsen;
 mod dataset;
 pub mod expand;
 mod fold;
+mod listing;
 pub mod parallel;
 mod pixel_storage;
 mod pixels;
@@ -19,8 +20,9 @@ mod store;
 pub use veni_light::{Error, Result};
 
 pub use augment::AugmentConfig;
-pub use dataset::{Dataset, Item, panorama_files};
+pub use dataset::{Dataset, Item};
 pub use fold::Fold;
+pub use listing::panorama_files;
 pub use pixel_storage::PixelStorage;
 pub use pixels::Pixels;
 pub use reconstruction::Reconstruction;

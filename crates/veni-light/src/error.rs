@@ -27,6 +27,14 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+    /// Another process works in the folder, and only one may.
+    #[error("{}: another process is at work here{}", path.display(), owner.as_ref().map(|o| format!(" ({o})")).unwrap_or_default())]
+    Busy {
+        /// The locked file.
+        path: PathBuf,
+        /// What it left in it.
+        owner: Option<String>,
+    },
     /// The data is, or claims to be, larger than a limit that protects the memory.
     #[error("{0}")]
     TooLarge(String),
@@ -86,9 +94,11 @@ impl Error {
             Self::Invalid(message) => Self::Invalid(named(message)),
             Self::Unsupported(message) => Self::Unsupported(named(message)),
             Self::TooLarge(message) => Self::TooLarge(named(message)),
-            other @ (Self::LowRange { .. } | Self::Exists { .. } | Self::Cancelled | Self::Io { .. }) => {
-                other
-            }
+            other @ (Self::LowRange { .. }
+            | Self::Exists { .. }
+            | Self::Busy { .. }
+            | Self::Cancelled
+            | Self::Io { .. }) => other,
         }
     }
 

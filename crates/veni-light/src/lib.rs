@@ -51,5 +51,6 @@ pub mod output;
 pub mod progress;
 pub mod random;
 pub mod sphere;
+pub mod text;
 
 pub use error::{Error, Result};

@@ -7,6 +7,9 @@ pub trait Observer: Sync {
 
     /// This many more units of the task that began last are done.
     fn advance(&self, units: usize);
+
+    /// Something is as it should not be, and the work goes on without it: one line that names it.
+    fn remark(&self, _line: &str) {}
 }
 
 /// Nobody observes.

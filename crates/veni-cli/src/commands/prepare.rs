@@ -4,6 +4,7 @@ mod contact;
 mod expand;
 mod network;
 mod place;
+mod plan;
 mod record;
 mod report;
 mod scan;
@@ -20,7 +21,7 @@ use veni_light::sphere::Equirect;
 
 use crate::args::Force;
 use crate::features::{LEARN, only};
-use crate::report::{Outcome, Report};
+use crate::report::{Outcome, Report, complain};
 use crate::shard::Shard;
 use crate::size::Size;
 use expand::Expand;
@@ -111,6 +112,9 @@ impl Prepare {
         let config =
             PrepareConfig { grid: Equirect::new(width, height), expand, read: ReadOptions::default() };
         let found = scan::scan(&self.inputs, &self.output)?;
+        for (path, reason) in &found.unreadable {
+            complain(&format!("{}: {reason}", path.display()));
+        }
         if found.sources.is_empty() {
             bail!("{}: no image files in there; name a folder that has some", scan::names(&self.inputs));
         }
@@ -137,7 +141,7 @@ impl Prepare {
         }
         let shares = Shares { val: self.val, test: self.test };
         let placing = Placing { shares, seed: self.seed, resplit: self.resplit };
-        let placed = place::place(&mut store, &placing)?;
+        let placed = place::place(&mut store, &placing, found.unreadable)?;
         contact::write(&store, &placed)?;
         report::write(&store, &settings, &placing, &placed, &found.ignored)?;
         report::print(&self.output, &placed, report)

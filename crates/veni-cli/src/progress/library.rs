@@ -21,6 +21,10 @@ impl Observer for Bars {
     fn advance(&self, units: usize) {
         self.add(units as u64);
     }
+
+    fn remark(&self, line: &str) {
+        self.note(line);
+    }
 }
 
 impl Progress for &Bars {

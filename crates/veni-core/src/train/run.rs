@@ -6,6 +6,8 @@
 //! | `metrics.jsonl` | a line per update and per validation |
 //! | `checkpoint/state.safetensors` | weights, Adam's moments, averaged weights, step |
 //! | `preview/step-*.png` | target, reconstruction, random sample |
+//! | `command.txt` | the command that began the run |
+//! | `.lock` | locked by the process that trains |
 //! | `model.safetensors` | the averaged weights that validated best, with the prior of the training latents |
 //! | `latents.safetensors` | of an auto-decoder: the latent table of these weights (see [`latents::save`](crate::train::latents::save)) |
 //!
@@ -31,11 +33,13 @@ use crate::train::replicas::{Computed, Replicas};
 use crate::vae::weights;
 use crate::{Error, Result};
 use veni_data::{Dataset, Splits};
+use veni_light::output::Lock;
 
 mod begin;
+mod folder;
 mod results;
 
-pub use begin::{is_free, leftovers};
+pub use folder::{is_free, leftovers, lock};
 
 /// Batches prepared ahead of the one being computed.
 const AHEAD: usize = 2;
@@ -53,6 +57,8 @@ pub enum Finish {
 #[derive(Debug)]
 pub struct Trainer {
     folder: PathBuf,
+    /// Nobody else trains in the folder.
+    lock: Option<Lock>,
     config: TrainConfig,
     /// Of the run's own `data`.
     splits: Splits,
@@ -94,6 +100,11 @@ impl Trainer {
     /// The network with its current (not averaged) weights.
     pub fn network(&self) -> &Network {
         self.replicas.first()
+    }
+
+    /// Whether nobody else can train in the run's folder: not where a file system knows no locks.
+    pub fn is_locked(&self) -> bool {
+        self.lock.as_ref().is_some_and(Lock::is_held)
     }
 
     /// What a run that was just created has from `config.init`.

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Latent;
 use crate::output::{Overwrite, write_atomic};
+use crate::text::decode;
 use crate::{Error, Result};
 
 /// Largest latent file that is read; N = 4096 vectors take about 200 kB.
@@ -80,7 +81,7 @@ impl Latent {
         Ok(latent)
     }
 
-    /// Reads a latent file.
+    /// Reads a latent file; a byte order mark, and UTF-16 behind one, is read too.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be read; otherwise as [`Latent::from_json`], also for a file larger than
@@ -93,8 +94,7 @@ impl Latent {
         if bytes.len() as u64 > MAX_LATENT_BYTES {
             return Err(Error::too_large("not a latent (too large)").in_file(path));
         }
-        let text =
-            String::from_utf8(bytes).map_err(|_| Error::invalid("not a latent (no text)").in_file(path))?;
+        let text = decode(bytes).map_err(|e| Error::invalid(format!("not a latent ({e})")).in_file(path))?;
         Self::from_json(&text).map_err(|e| e.in_file(path))
     }
 

@@ -16,8 +16,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use clap::Args;
 use veni_light::Error;
+use veni_light::text::begins_object;
 
 use crate::features::{GPU, only};
+use crate::piped;
 use crate::report::{self, Outcome, Report};
 use facts::Facts;
 
@@ -47,7 +49,7 @@ const DEVICES: &str = "\n\nWith --devices: every graphics device that could bake
         only(GPU, "\n  veni-cli inspect --devices"))
 )]
 pub(crate) struct Inspect {
-    /// Files, or folders of training runs
+    /// Files, or folders of training runs; - is standard input
     #[cfg_attr(feature = "gpu", arg(required_unless_present = "devices"))]
     #[cfg_attr(not(feature = "gpu"), arg(required = true))]
     #[arg(value_name = "FILE")]
@@ -65,10 +67,10 @@ impl Inspect {
         if self.devices {
             return devices::run(report);
         }
-        report::each(&self.files, |path| {
+        report::each(piped::inputs(&self.files)?, |path| {
             let name = path.display().to_string();
-            let facts = describe(path)?;
-            report.result(facts.text(&name), &facts.json("file", &name))
+            let facts = describe(&path)?;
+            report.table(&facts.text(&name), &facts.json("file", &name))
         })
     }
 }
@@ -85,7 +87,7 @@ fn describe(path: &Path) -> Result<Facts> {
         [] => bail!("{}: the file is empty; nothing can be said about it", path.display()),
         // safetensors: the length of a JSON header in 8 bytes, then that header
         [_, _, _, _, _, 0, 0, 0, b'{', ..] => model::describe(path),
-        text if text.trim_ascii_start().starts_with(b"{") => latent::describe(path),
+        text if begins_object(text) => latent::describe(path),
         _ => image::describe(path),
     }
 }

@@ -11,6 +11,7 @@ use veni_data::prepare::Split;
 use super::place::{Kept, Placed, Placing};
 use super::record::Record;
 use super::store::{Settings, Store, write_bytes, write_json};
+use crate::printable::printable;
 use crate::report::{Outcome, Report};
 
 pub(super) fn write(
@@ -27,7 +28,7 @@ pub(super) fn write(
     }));
     files.extend(
         (placed.refused.iter())
-            .map(|(record, reason)| json!({"source": record.source, "fate": "refused", "reason": reason})),
+            .map(|(source, reason)| json!({"source": source, "fate": "refused", "reason": reason})),
     );
     files.extend(
         ignored
@@ -57,7 +58,7 @@ pub(super) fn write(
 /// The result of the command; files that were refused make it a negative one.
 pub(super) fn print(output: &Path, placed: &Placed, report: Report) -> Result<Outcome> {
     let refused: Vec<Value> =
-        placed.refused.iter().map(|(r, reason)| json!({"source": r.source, "reason": reason})).collect();
+        placed.refused.iter().map(|(source, reason)| json!({"source": source, "reason": reason})).collect();
     let mut value = counts(placed, 0);
     if let Value::Object(map) = &mut value {
         map.remove("ignored");
@@ -145,7 +146,11 @@ fn markdown(
         placed.duplicates.len(),
         ignored.len()
     )?;
-    section(&mut out, "Refused", placed.refused.iter().map(|(r, reason)| format!("{}: {reason}", r.source)))?;
+    section(
+        &mut out,
+        "Refused",
+        placed.refused.iter().map(|(source, reason)| format!("{source}: {reason}")),
+    )?;
     section(
         &mut out,
         "Duplicates, byte for byte",
@@ -196,7 +201,7 @@ fn section(out: &mut String, title: &str, lines: impl Iterator<Item = String>) -
         if at == 0 {
             writeln!(out, "\n## {title}\n")?;
         }
-        writeln!(out, "- {line}")?;
+        writeln!(out, "- {}", printable(&line))?;
     }
     Ok(())
 }

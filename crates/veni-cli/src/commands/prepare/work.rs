@@ -14,7 +14,7 @@ use super::scan::Source;
 use super::store::Store;
 use crate::output::with_remedy;
 use crate::progress::Bars;
-use crate::report::{Report, to_stderr};
+use crate::report::{Report, complain};
 
 /// Files of more bytes than this are examined one at a time: their pixels fill the memory.
 const LARGE: u64 = 1 << 25;
@@ -42,7 +42,7 @@ pub(super) fn examine_all(
     let one = |source: &&Source| -> Result<()> {
         let fate = fate(&store, source, config, network)?;
         if let Fate::Refused(reason) = &fate {
-            to_stderr(&format!("{}: {reason}\n", source.path.display()));
+            complain(&format!("{}: {reason}", source.path.display()));
         }
         lock(&store).add(Record::new(source, fate))?;
         bars.add(1);

@@ -8,6 +8,7 @@ use veni_core::train::init::InitConfig;
 use veni_core::train::presets::Preset;
 use veni_light::Error;
 use veni_light::model::ModelKind;
+use veni_light::text::decode;
 
 use super::args::{PresetName, SystemName, Train};
 use crate::source;
@@ -94,6 +95,7 @@ impl Train {
 }
 
 pub(super) fn read(path: &Path) -> Result<TrainConfig> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let text = decode(bytes).map_err(|e| e.in_file(path))?;
     Ok(TrainConfig::from_toml(&text).map_err(|e| e.in_file(path))?)
 }
