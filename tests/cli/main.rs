@@ -13,6 +13,7 @@ mod crashes;
 mod embedded;
 #[cfg(feature = "learn")]
 mod encode;
+mod entries;
 #[cfg(feature = "learn")]
 mod evaluate;
 mod expand_with;
@@ -41,6 +42,8 @@ mod promises;
 mod readers;
 #[cfg(feature = "learn")]
 mod render_probe;
+#[cfg(feature = "learn")]
+mod runs;
 #[cfg(feature = "learn")]
 mod shards;
 #[cfg(feature = "learn")]

@@ -136,7 +136,7 @@ fn a_mesh_leads_nowhere() {
     let dir = start();
     let victim = text(&dir.path("victim.txt"));
     for library in ["../victim.txt", victim.as_str(), "victim.txt", "/dev/zero"] {
-        dir.write("m.obj", format!("mtllib {library}\nusemtl x\nv 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n"));
+        dir.write("m.obj", format!("mtllib {library}\nusemtl x\nv 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n"));
         dir.ok(&[
             "render-probe",
             "--seed",
