@@ -54,7 +54,7 @@ fn a_folder_that_cannot_be_read_is_listed() {
     use std::os::unix::fs::PermissionsExt;
     let dir = library();
     std::fs::create_dir(dir.path("lib/closed")).unwrap();
-    std::fs::set_permissions(dir.path("lib/closed"), std::fs::Permissions::from_mode(0)).unwrap();
+    std::fs::set_permissions(dir.path("lib/closed"), std::fs::Permissions::from_mode(0o0)).unwrap();
     // to the superuser nothing is closed
     if std::fs::read_dir(dir.path("lib/closed")).is_ok() {
         return;

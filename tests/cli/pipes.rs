@@ -141,7 +141,7 @@ fn byte_order_marks_are_read() {
         let shown = dir.ok(&["inspect", name]);
         assert!(shown.contains("latent") && shown.contains("9 (D = 27)"), "{shown}");
     }
-    dir.write("cut.json", &[0xff, 0xfe, b'{']);
+    dir.write("cut.json", [0xff, 0xfe, b'{']);
     dir.refused(&["inspect", "cut.json"], &["cut.json", "UTF-16"]);
 }
 

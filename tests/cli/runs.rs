@@ -123,9 +123,9 @@ fn links_in_a_run_lead_nowhere() {
         let inside = dir.path("run").join(name);
         let is_folder = inside.is_dir();
         if is_folder {
-            std::fs::remove_dir_all(&inside).unwrap()
+            std::fs::remove_dir_all(&inside).unwrap();
         } else {
-            std::fs::remove_file(&inside).unwrap()
+            std::fs::remove_file(&inside).unwrap();
         }
         let target = if is_folder { dir.path("mine") } else { dir.path("mine/metrics.jsonl") };
         symlink(&target, &inside).unwrap();

@@ -45,7 +45,7 @@ pub fn panorama_files(folder: &Path, observer: &dyn Observer) -> Result<Vec<Path
                     observer.remark(&format!("{}: is {what}, and left out", path.display()));
                 }
                 Err(e) => {
-                    observer.remark(&format!("{}: {}, and left out", path.display(), unreadable(&path, &e)))
+                    observer.remark(&format!("{}: {}, and left out", path.display(), unreadable(&path, &e)));
                 }
             }
         } else if LOW_RANGE.iter().any(|low| extension == *low) {

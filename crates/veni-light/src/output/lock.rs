@@ -11,7 +11,8 @@ use crate::{Error, Result};
 pub struct Lock {
     path: PathBuf,
     held: bool,
-    _file: File,
+    exclusive: bool,
+    file: File,
 }
 
 impl Lock {
@@ -23,7 +24,8 @@ impl Lock {
         let mut lock = Self::take(path, File::try_lock)?;
         if lock.held {
             // for whoever meets the lock; who that is does not depend on it
-            let file = &mut lock._file;
+            lock.exclusive = true;
+            let file = &mut lock.file;
             let _ = file.set_len(0).and_then(|()| writeln!(file, "process {}", std::process::id()));
         }
         Ok(lock)
@@ -67,7 +69,16 @@ impl Lock {
             }
             Err(TryLockError::Error(_)) => false,
         };
-        Ok(Self { path: path.to_path_buf(), held, _file: file })
+        Ok(Self { path: path.to_path_buf(), held, exclusive: false, file })
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        if self.exclusive {
+            // what is said of the owner goes with it
+            let _ = self.file.set_len(0);
+        }
     }
 }
 
@@ -86,6 +97,7 @@ mod tests {
         assert!(message.contains(&std::process::id().to_string()), "{message}");
         assert!(busy(Lock::shared(&path)));
         drop(first);
+        assert_eq!(path.metadata().unwrap().len(), 0);
         let shared = [Lock::shared(&path).unwrap(), Lock::shared(&path).unwrap()];
         assert!(busy(Lock::exclusive(&path)));
         drop(shared);
