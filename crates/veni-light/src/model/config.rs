@@ -70,9 +70,9 @@ pub enum VnReluForm {
     /// q − ⟨q, k⟩/|k|² · k: the true projection (Deng et al. 2021). The default.
     #[default]
     Projection,
-    /// q − ⟨q, k⟩/|k| · k with |k| = √max(Σk², 1e-6): the authors' `vn_layers`.
+    /// q − ⟨q, k⟩/|k| · k with |k| = √max(Σk², 1e-6): the reference's `vn_layers`.
     Reference,
-    /// q − ⟨q, k⟩/|k| · k with |k| = max(‖k‖, 1e-6): the authors' `sox_layers`, and RENI++.
+    /// q − ⟨q, k⟩/|k| · k with |k| = max(‖k‖, 1e-6): the reference's `sox_layers`, and RENI++.
     ReferenceNormGuard,
 }
 
