@@ -96,24 +96,19 @@ impl Format {
 pub(crate) struct Job {
     pub(crate) sky: Sky,
     pub(crate) files: Vec<PathBuf>,
+    /// What is written to standard output instead of files.
+    stdout: Option<Format>,
 }
 
 impl Job {
     /// Does `work`; what it would write to `-` goes to standard output, and its results then to stderr.
     pub(crate) fn run(self, report: Report, work: impl FnOnce(&Self, Report) -> Result<()>) -> Result<()> {
-        let [file] = self.files.as_slice() else { return work(&self, report) };
-        let Some(extension) = file.extension().filter(|_| is_piped(file)) else { return work(&self, report) };
-        let extension = extension.to_string_lossy().into_owned();
-        let bytes = piped::output(&extension, |path| {
+        let Some(format) = self.stdout else { return work(&self, report) };
+        let bytes = piped::output(format.extension(), |path| {
             work(&Self { files: vec![path.to_path_buf()], ..self }, report.beside_stdout())
         })?;
         to_stdout(&bytes)
     }
-}
-
-/// Whether a file of a job stands for standard output: `-` with the extension of what is written.
-fn is_piped(file: &Path) -> bool {
-    piped::is_stdout(Path::new(file.file_stem().unwrap_or_default())) && file.components().count() == 1
 }
 
 /// What a sky is named by.
@@ -156,8 +151,9 @@ pub(crate) fn jobs(
         if skies.len() > 1 {
             bail!("-o names the images of one sky, not of {}: name a folder with --out-dir DIR", skies.len());
         }
-        let files = if to_stdout { vec![standard(&target.output, formats)?] } else { target.output.clone() };
-        let jobs = skies.into_iter().map(|sky| Job { sky, files: files.clone() });
+        let stdout = to_stdout.then(|| standard(&target.output, formats)).transpose()?;
+        let files = if to_stdout { Vec::new() } else { target.output.clone() };
+        let jobs = skies.into_iter().map(|sky| Job { sky, files: files.clone(), stdout });
         let jobs = many.shard.own(&jobs.collect::<Vec<_>>());
         if !jobs.is_empty() && !to_stdout {
             output::check(&target.output, &EXTENSIONS, overwrite)?;
@@ -174,13 +170,13 @@ pub(crate) fn jobs(
     with_inputs(jobs)
 }
 
-/// Standard output as the one file of a job.
-fn standard(outputs: &[PathBuf], formats: &[Format]) -> Result<PathBuf> {
+/// What goes to standard output, the only output.
+fn standard(outputs: &[PathBuf], formats: &[Format]) -> Result<Format> {
     let ([_], [format]) = (outputs, formats) else {
         bail!("-o -: standard output takes one image in one format; name files for others");
     };
     piped::check_stdout()?;
-    Ok(PathBuf::from(format!("-.{}", format.extension())))
+    Ok(*format)
 }
 
 /// Jobs whose skies are in files that can be read as often as needed.
@@ -207,7 +203,7 @@ fn job(sky: Sky, folder: &Path, formats: &[Format]) -> Result<Job> {
         Sky::Seed(seed) => PathBuf::from(format!("seed-{seed}")),
     };
     let files = formats.iter().map(|f| output::named(folder, &name, f.extension())).collect::<Result<_>>()?;
-    Ok(Job { sky, files })
+    Ok(Job { sky, files, stdout: None })
 }
 
 fn count(text: &str) -> Result<u64, String> {
