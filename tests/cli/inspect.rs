@@ -60,6 +60,7 @@ fn completions_and_manual_pages_know_every_command() {
         "fit",
         "prepare",
         "render-probe",
+        "light",
         "inspect",
         "bench",
         "train",
@@ -88,7 +89,7 @@ fn completions_and_manual_pages_know_every_command() {
 fn help_goes_to_stdout_and_shows_examples() {
     let dir = Dir::new();
     for command in
-        ["bake", "sample", "encode", "evaluate", "fit", "render-probe", "inspect", "bench", "train"]
+        ["bake", "sample", "encode", "evaluate", "fit", "render-probe", "light", "inspect", "bench", "train"]
     {
         let text = dir.ok(&[command, "--help"]);
         assert!(text.contains("Examples:") && text.contains(&format!("veni-cli {command}")), "{command}");

@@ -51,8 +51,10 @@ pub(crate) enum Command {
     Synth(commands::synth::Synth),
     Encode(commands::encode::Encode),
     Fit(commands::fit::Fit),
+    Ibl(commands::ibl::Ibl),
     Prepare(commands::prepare::Prepare),
     RenderProbe(commands::render_probe::RenderProbe),
+    Light(commands::light::Light),
     #[cfg(feature = "learn")]
     Evaluate(commands::evaluate::Evaluate),
     Inspect(commands::inspect::Inspect),
@@ -72,8 +74,10 @@ impl Command {
             Self::Synth(c) => c.run(report),
             Self::Encode(c) => c.run(report),
             Self::Fit(c) => c.run(report),
+            Self::Ibl(c) => c.run(report),
             Self::Prepare(c) => c.run(report),
             Self::RenderProbe(c) => c.run(report),
+            Self::Light(c) => c.run(report),
             #[cfg(feature = "learn")]
             Self::Evaluate(c) => c.run(report),
             Self::Inspect(c) => c.run(report),

@@ -20,6 +20,9 @@ pub(crate) const FRAME: &str = "veni:frame";
 /// Attribute of a cube map: its faces from top to bottom.
 pub(crate) const CUBE_FACES: &str = "veni:cubeFaces";
 
+/// Attribute of a generated scene: its parameters. Its unit is kcd/m².
+pub(crate) const SCENE: &str = "veni:scene";
+
 /// Attribute of a rendered image and of its normals: the camera (`veni_fit::shade::Camera`).
 pub(crate) const CAMERA: &str = "veni:camera";
 /// Attribute of a rendered image: what the surface is made of.

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use crate::parallel::parallel;
 use crate::pixels::Pixels;
 use crate::{Error, Result};
-use veni_image::Panorama;
 use veni_image::exposure::centre_exposure;
+use veni_image::{Budget, Panorama, ReadOptions};
 use veni_light::progress::{Observer, Silent};
 use veni_light::sphere::Equirect;
 
@@ -65,8 +65,8 @@ impl Dataset {
         Self { grid, items: Arc::new(items) }
     }
 
-    /// Reads, cleans and resamples files, in parallel; the order is kept. As many files as there are processors are
-    /// in memory at their full size at a time.
+    /// Reads, cleans and resamples files, in parallel; the order is kept. At most as many files as there are processors are
+    /// in memory at their full size at a time, fewer where their pixels are more than [`Budget::shared`].
     ///
     /// # Errors
     /// All files that cannot be read, by name; if it is one, what is wrong with it.
@@ -130,10 +130,12 @@ pub(super) fn load(
     observer: &dyn Observer,
 ) -> Result<Vec<Item>> {
     let read = parallel(files.len(), |at| {
+        let claim = Budget::shared().claim_file(&files[at], &ReadOptions::default());
         let item = match read_item(&files[at], grid, observer) {
             Ok(item) => Ok(keep(at, item)?),
             Err(error) => Err(error),
         };
+        drop(claim);
         observer.advance(1);
         Ok(item)
     })?;

@@ -61,7 +61,7 @@ impl Panorama {
                 }
             },
         );
-        Self { grid, pixels, attributes: self.attributes.clone() }
+        Self { grid, pixels, attributes: self.attributes.clone(), provenance: self.provenance }
     }
 
     /// The mirror image (x, y, z) → (x, −y, z): columns in reverse order.

@@ -50,6 +50,8 @@ mod terrain;
 mod view;
 
 #[cfg(test)]
+mod sun_tests;
+#[cfg(test)]
 mod tests;
 
 pub use veni_light::{Error, Result};

@@ -2,6 +2,7 @@
 
 mod contact;
 mod expand;
+mod gone;
 mod network;
 mod place;
 mod plan;
@@ -32,7 +33,7 @@ use store::{Settings, Store};
 #[derive(Args, Debug)]
 #[command(
     long_about = "Turn any folder of equirectangular panoramas into a training folder: \
-        train/, val/ (and test/) with half-float EXR files of one size, report.md, report.json and contact.png.\n\n\
+        train/, val/ (and test/) with EXR files of one size, report.md, report.json and contact.png.\n\n\
         Folders are searched to the bottom for OpenEXR and Radiance files and for PNG, JPEG, WebP and (feature avif) AVIF \
         images of any size. Those hold no more than a display's range: their clipped regions are found and the sun and other highlights rebuilt \
         (--expand). Every file is checked; what is broken, not twice as wide as high, too small, black, transparent or one grey \
@@ -49,8 +50,8 @@ use store::{Settings, Store};
         mixed. Where H and W are free, the panorama is continued round the sides and over the poles by 64 pixels or \
         more, to sides that are multiples of 32; where they are fixed, it is resampled to them. Panoramas for which \
         it gives NaN, infinity or negative radiance are refused.\n\n\
-        Stopped half-way, the same command continues where it was; run again, it takes in only what is new or changed. \
-        --force starts over and removes what an earlier run wrote into DIR, nothing else.",
+        Stopped half-way, the same command continues where it was; run again, it takes in only what is new or changed; \
+        images whose sources are gone are kept and listed. --force starts over and removes what an earlier run wrote into DIR, nothing else.",
     after_help = format!("Exit code 1: ready, but some files were refused.\n\n\
         Examples:\n  \
         veni-cli prepare panoramas/ -o data{}\n  \
@@ -143,8 +144,10 @@ impl Prepare {
         let placing = Placing { shares, seed: self.seed, resplit: self.resplit };
         let placed = place::place(&mut store, &placing, found.unreadable)?;
         contact::write(&store, &placed)?;
-        report::write(&store, &settings, &placing, &placed, &found.ignored)?;
-        report::print(&self.output, &placed, report)
+        let gone = gone::sources(&placed, &found.sources);
+        gone::note(&gone, report);
+        report::write(&store, &settings, &placing, &placed, &found.ignored, &gone)?;
+        report::print(&self.output, &placed, &gone, report)
     }
 }
 

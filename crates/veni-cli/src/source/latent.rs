@@ -11,6 +11,7 @@ use veni_light::model::Model;
 use veni_light::text::begins_object;
 
 use super::model::{Loaded, embedded, model};
+use super::remembered::is_of_its_pixels;
 use crate::args::ModelArgs;
 use crate::output::{CUBE_FACES, LATENT, with_remedy};
 use crate::report::Report;
@@ -32,14 +33,32 @@ pub(crate) fn seeded(model: &Model, seed: u64) -> Latent {
     Latent { model: Some(model.hash()), ..Latent::from_seed(&model.prior(), seed) }
 }
 
-/// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder.
+/// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder. An image whose
+/// pixels are no longer those of its latent is encoded.
 pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
     let model = &loaded.model;
     let mut latent = match stored(path)? {
         Some(latent) => latent,
-        None => encode(path, loaded, report)?,
+        None => {
+            report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
+            encode(path, loaded, report)?
+        }
     };
     check(&latent, loaded).with_context(|| path.display().to_string())?;
+    if !is_latent(path)? && !is_of_its_pixels(path, &latent, model)? {
+        if is_cube_map(path)? {
+            bail!(
+                "{}: a cube map whose pixels were changed after its latent was written, and cube maps cannot be encoded; \
+                 name the original, or an equirectangular panorama",
+                path.display()
+            );
+        }
+        report.note(format_args!(
+            "{}: its pixels were changed after its latent was written; encoding the panorama",
+            path.display()
+        ));
+        latent = encode(path, loaded, report)?;
+    }
     if latent.model.is_none() {
         report.note(format_args!(
             "{}: does not say which model it belongs to; taken for this one",
@@ -101,8 +120,11 @@ fn inside(_: &Latent) -> Option<usize> {
     None
 }
 
+fn is_cube_map(path: &Path) -> Result<bool> {
+    Ok(veni_image::attributes(path).map_err(with_remedy)?.contains_key(CUBE_FACES))
+}
+
 fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
-    report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
     super::encoding::Encoding::new(loaded)?.encode_file(path, report).map(|e| e.latent)
 }
 

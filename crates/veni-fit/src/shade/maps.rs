@@ -188,7 +188,6 @@ mod tests {
         let normals =
             vec![[0.0, 0.0, -1.0], [0.6, -0.8, 0.0], [0.0; 3], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]];
         let options = WriteOptions {
-            latlong: false,
             overwrite: Overwrite::Refuse,
             ..WriteOptions::new(WriteFormat::Exr(Precision::Float))
         };

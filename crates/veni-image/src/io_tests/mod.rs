@@ -2,6 +2,7 @@
 
 mod foreign;
 mod poisoned;
+mod remembered;
 mod round_trips;
 
 use std::path::Path;

@@ -8,6 +8,7 @@ use image::codecs::hdr::{HdrDecoder, HdrMetadata};
 use image::{ImageDecoder, ImageError};
 
 use super::ReadOptions;
+use crate::numbered::join;
 use crate::panorama::Panorama;
 use crate::{Error, Result};
 
@@ -21,10 +22,11 @@ pub(super) fn read(file: impl Read, path: &Path, strict: bool, options: &ReadOpt
     let mut pixels = vec![[0f32; 3]; grid.len()];
     decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(|e| wrap(e, path))?;
     let mut panorama = Panorama::new(grid, pixels);
+    panorama.attributes = text(&header);
+    panorama.note_provenance();
     if exposure != 1.0 {
         panorama.scale(1.0 / exposure);
     }
-    panorama.attributes = text(&header);
     Ok(panorama)
 }
 
@@ -49,7 +51,7 @@ fn open<R: Read>(file: R, path: &Path, strict: bool) -> Result<(HdrDecoder<R>, H
 }
 
 fn text(header: &HdrMetadata) -> BTreeMap<String, String> {
-    header.custom_attributes.iter().filter(|(name, _)| !name.is_empty()).cloned().collect()
+    join(header.custom_attributes.iter().filter(|(name, _)| !name.is_empty()).cloned().collect())
 }
 
 fn wrap(error: ImageError, path: &Path) -> Error {

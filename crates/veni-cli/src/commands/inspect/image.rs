@@ -4,13 +4,13 @@ use std::path::Path;
 
 use anyhow::{Result, anyhow};
 use serde_json::json;
-use veni_image::{self, Panorama};
+use veni_image::{self, Panorama, Provenance};
 use veni_light::latent::Latent;
 
 use super::facts::Facts;
 use super::latent;
 use super::statistics::Statistics;
-use crate::output::{CUBE_FACES, FRAME, LATENT, with_remedy};
+use crate::output::{CAMERA, CUBE_FACES, FRAME, LATENT, with_remedy};
 
 pub(super) fn describe(path: &Path) -> Result<Facts> {
     let attributes = veni_image::attributes(path).map_err(with_remedy)?;
@@ -38,7 +38,8 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     {
         facts.attribute(name, value);
     }
-    if !cube {
+    // a rendered picture is no panorama
+    if !cube && !attributes.contains_key(CAMERA) {
         radiance(path, &mut facts)?;
     }
     Ok(facts)
@@ -49,6 +50,15 @@ fn radiance(path: &Path, facts: &mut Facts) -> Result<()> {
     let grid = image.grid();
     if !facts.has("size") {
         facts.add("size", format!("{} x {}", grid.width, grid.height), json!([grid.width, grid.height]));
+    }
+    match image.provenance() {
+        Provenance::Unrecorded => {}
+        Provenance::Same => facts.add("pixels", "those that the attributes were written with", "same"),
+        Provenance::Changed => facts.add(
+            "pixels",
+            "changed after the attributes were written: a latent or a factor among these is not theirs",
+            "changed",
+        ),
     }
     let bad = image.sanitise().map_err(|e| e.in_file(path))?;
     if bad.total() > 0 {

@@ -8,6 +8,7 @@ mod latent;
 mod model;
 pub(crate) mod run;
 mod statistics;
+mod texture;
 
 use std::fs::File;
 use std::io::Read;
@@ -15,6 +16,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
+use veni_image::texture::{EnvHeader, Ktx2Header};
 use veni_light::Error;
 use veni_light::text::begins_object;
 
@@ -31,15 +33,18 @@ const DEVICES: &str = "\n\nWith --devices: every graphics device that could bake
 
 #[cfg_attr(
     feature = "gpu",
-    doc = "Show what is inside models, latents, images and training runs, or the graphics devices"
+    doc = "Show what is inside models, latents, images, textures and training runs, or the graphics devices"
 )]
-#[cfg_attr(not(feature = "gpu"), doc = "Show what is inside models, latents, images and training runs")]
+#[cfg_attr(
+    not(feature = "gpu"),
+    doc = "Show what is inside models, latents, images, textures and training runs"
+)]
 #[derive(Args, Debug)]
 #[command(
-    long_about = format!("Show what is inside models, latents, images and training runs.\n\n\
+    long_about = format!("Show what is inside models, latents, images, textures and training runs.\n\n\
         Model: sizes, identity, training data, prior. Latent: vectors, lengths, exposure, the model it belongs to. \
         Image: size, storage, attributes, radiance over the sphere, dynamic range, where the sun is, the latent it \
-        was baked from. Run folder: how far it is, how good.\n\n\
+        was baked from. Texture (KTX2, Babylon.js .env): format, size, faces, levels. Run folder: how far it is, how good.\n\n\
         The content decides what a file is, not its name. Radiance statistics are weighted by solid angle.{}",
         only(GPU, DEVICES)),
     after_help = format!("Examples:\n  \
@@ -87,6 +92,8 @@ fn describe(path: &Path) -> Result<Facts> {
         [] => bail!("{}: the file is empty; nothing can be said about it", path.display()),
         // safetensors: the length of a JSON header in 8 bytes, then that header
         [_, _, _, _, _, 0, 0, 0, b'{', ..] => model::describe(path),
+        start if Ktx2Header::recognises(start) => texture::ktx2(path),
+        start if EnvHeader::recognises(start) => texture::env(path),
         text if begins_object(text) => latent::describe(path),
         _ => image::describe(path),
     }

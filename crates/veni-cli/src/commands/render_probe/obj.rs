@@ -5,9 +5,13 @@ use std::path::Path;
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use veni_fit::shade::Mesh;
-use veni_light::Error;
+use veni_light::limits::{at_most, read_file};
 use veni_light::text;
 
+/// Bytes of an OBJ file: the largest scans have a few hundred MB.
+const MAX_OBJ_BYTES: u64 = 1 << 30;
+/// Corners of its faces, each of which takes some 100 bytes in memory and two in the file: a scan of 11 million triangles.
+const MAX_OBJ_CORNERS: u64 = 1 << 25;
 /// A mesh whose centre is farther away than this many times its size loses digits in single precision that are seen
 /// (2⁻²⁴ of the distance): it is moved to the origin first.
 const FAR: f64 = 16.0;
@@ -30,11 +34,12 @@ pub(super) struct Placed {
 
 /// Reads a file; every triangle has three vertices of its own.
 pub(super) fn read(path: &Path, up: Up) -> Result<Placed> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let bytes = read_file(path, "a Wavefront OBJ file that is read", MAX_OBJ_BYTES)?;
     let text = text::decode(bytes)
         .map_err(|_| anyhow!("{}: is not text: a Wavefront OBJ file is", path.display()))?;
     let text = statements(&text);
     let [with, without] = corners(&text);
+    at_most("corners of faces", (with + without) as u64, MAX_OBJ_CORNERS).map_err(|e| e.in_file(path))?;
     if with > 0 && without > 0 {
         bail!(
             "{}: {without} of {} corners of faces lack normals: give all of them one, or none",

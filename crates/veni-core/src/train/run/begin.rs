@@ -8,10 +8,10 @@ use super::folder::{FOLDERS, clear_leftovers, record_command, recorded_command, 
 use super::*;
 use crate::train::init::{self, InitConfig};
 use veni_data::PixelStorage;
+use veni_light::limits::{MAX_SETTINGS_BYTES, read_text};
 use veni_light::model::Model;
 use veni_light::output::{Lock, Overwrite, existing_above, write_atomic};
 use veni_light::progress::{Observer, Silent};
-use veni_light::text::decode;
 
 impl Trainer {
     /// Starts a run in `folder`, which must be free ([`is_free`](super::is_free)). `command` is recorded in the model file.
@@ -99,8 +99,7 @@ impl Trainer {
         observer: &dyn Observer,
     ) -> Result<Self> {
         let path = folder.join("config.toml");
-        let bytes = fs::read(&path).map_err(|e| Error::io(&path, "read", e))?;
-        let text = decode(bytes).map_err(|e| e.in_file(&path))?;
+        let text = read_text(&path, "a configuration", MAX_SETTINGS_BYTES)?;
         let config = TrainConfig::from_toml(&text).map_err(|e| e.in_file(&path))?.with_pixel_storage(storage);
         let lock = super::lock(folder)?;
         clear_leftovers(folder)?;

@@ -1,9 +1,8 @@
 //! Spherical harmonics: 3(L+1)² numbers.
 
-mod basis;
 pub mod reference;
 
-pub use basis::Basis;
+pub use veni_light::light::sh::Basis;
 
 use super::least_squares;
 use super::target::Target;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 /// What `work` gives for each task, in their order. `scratch` makes workspace that a thread keeps from task to task.
 #[cfg(feature = "parallel")]
-pub(super) fn map<T: Send, S, R: Send>(
+pub(crate) fn map<T: Send, S, R: Send>(
     tasks: impl Iterator<Item = T>,
     scratch: impl Fn() -> S + Sync + Send,
     work: impl Fn(&mut S, T) -> R + Sync + Send,
@@ -16,7 +16,7 @@ pub(super) fn map<T: Send, S, R: Send>(
 
 /// What `work` gives for each task, in their order, with one `scratch` for all.
 #[cfg(not(feature = "parallel"))]
-pub(super) fn map<T, S, R>(
+pub(crate) fn map<T, S, R>(
     tasks: impl Iterator<Item = T>,
     scratch: impl Fn() -> S,
     work: impl Fn(&mut S, T) -> R,
@@ -26,7 +26,7 @@ pub(super) fn map<T, S, R>(
 }
 
 /// [`map`] for work that leaves nothing but what it wrote.
-pub(super) fn each<T: Send, S>(
+pub(crate) fn each<T: Send, S>(
     tasks: impl Iterator<Item = T>,
     scratch: impl Fn() -> S + Sync + Send,
     work: impl Fn(&mut S, T) + Sync + Send,
@@ -35,7 +35,7 @@ pub(super) fn each<T: Send, S>(
 }
 
 /// `work` once on every thread at the same time.
-pub(super) fn on_every_thread<R: Send>(work: impl Fn() -> R + Sync) -> Vec<R> {
+pub(crate) fn on_every_thread<R: Send>(work: impl Fn() -> R + Sync) -> Vec<R> {
     #[cfg(feature = "parallel")]
     let results = rayon::broadcast(|_| work());
     #[cfg(not(feature = "parallel"))]

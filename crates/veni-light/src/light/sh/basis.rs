@@ -87,7 +87,7 @@ impl Basis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use veni_light::sphere::Equirect;
+    use crate::sphere::Equirect;
 
     #[test]
     fn low_orders_are_the_textbook_polynomials() {

@@ -1,0 +1,155 @@
+//! A compact light: what reaches a scene from one small solid angle, told by a few numbers.
+
+use std::fmt;
+
+/// A light of small solid angle: the sun, the moon, a lamp, a bright window.
+///
+/// What is stored is the light's energy, the integral of its radiance over its solid angle, E⊥ = ∫ L dω: it stays finite as
+/// the light becomes a point, and is then the irradiance of a surface that faces it. (A disc of radius r lights that surface by
+/// cos²(r/2) E⊥; for the sun that is less by 5e-6.)
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CompactLight {
+    /// Unit direction towards the light, native frame.
+    pub direction: [f32; 3],
+    /// Irradiance at normal incidence, E⊥ = ∫ L dω (R, G, B), in units of radiance times steradian.
+    pub irradiance: [f32; 3],
+    /// Angular radius, radians.
+    pub radius: f32,
+    /// Where the radius comes from.
+    pub radius_source: RadiusSource,
+    /// What the panorama shows of it.
+    pub kind: Kind,
+    /// Its share of the light that reaches a surface facing it, 0 to 1 (luminance).
+    pub share: f32,
+    /// Whether the panorama's largest value cut it off: the irradiance is then a lower bound.
+    pub clipped: bool,
+}
+
+/// Where the angular radius of a [`CompactLight`] comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum RadiusSource {
+    /// From the panorama.
+    Measured,
+    /// The sun's true radius: the panorama's pixels are too large to show another.
+    Assumed,
+    /// Asked for.
+    Requested,
+}
+
+/// What a panorama shows of a [`CompactLight`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// A disc of less than 1.5° radius.
+    Disc,
+    /// Spread over 1.5° to 6°: a sun through haze or thin cloud.
+    Glow,
+    /// Wider than 6°, as in decoded latents and in panoramas of low dynamic range.
+    Lobe,
+}
+
+impl Kind {
+    /// The kind of a light of this angular radius, radians.
+    pub fn of(radius: f32) -> Self {
+        match radius.to_degrees() {
+            r if r < 1.5 => Self::Disc,
+            r if r <= 6.0 => Self::Glow,
+            _ => Self::Lobe,
+        }
+    }
+}
+
+impl fmt::Display for RadiusSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Measured => "measured",
+            Self::Assumed => "assumed",
+            Self::Requested => "requested",
+        })
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Disc => "disc",
+            Self::Glow => "glow",
+            Self::Lobe => "lobe",
+        })
+    }
+}
+
+impl CompactLight {
+    /// Angular radius of the sun as seen from the earth, radians: 0.2665°.
+    pub const SUN_RADIUS: f32 = 0.2665 * std::f32::consts::PI / 180.0;
+
+    /// Azimuth in radians, counter-clockwise from +x seen from above, in (−π, π].
+    pub fn azimuth(&self) -> f32 {
+        self.direction[1].atan2(self.direction[0])
+    }
+
+    /// Elevation above the horizon in radians.
+    pub fn elevation(&self) -> f32 {
+        let [x, y, z] = self.direction;
+        z.atan2(x.hypot(y))
+    }
+
+    /// Solid angle of the disc, Ω = 2π(1 − cos r).
+    pub fn solid_angle(&self) -> f32 {
+        // 1 − cos r without cancellation
+        let s = (0.5 * self.radius).sin();
+        4.0 * std::f32::consts::PI * s * s
+    }
+
+    /// Radiance of the disc above what surrounds it, E⊥ / Ω. Infinite for a radius of 0.
+    pub fn radiance(&self) -> [f32; 3] {
+        self.irradiance.map(|e| e / self.solid_angle())
+    }
+
+    /// The same light after a turn by `angle` radians about z, counter-clockwise seen from above.
+    #[must_use]
+    pub fn turned(mut self, angle: f32) -> Self {
+        let ((s, c), [x, y, z]) = (angle.sin_cos(), self.direction);
+        self.direction = [c * x - s * y, s * x + c * y, z];
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn light(direction: [f32; 3]) -> CompactLight {
+        CompactLight {
+            direction,
+            irradiance: [3.0, 2.0, 1.0],
+            radius: CompactLight::SUN_RADIUS,
+            radius_source: RadiusSource::Assumed,
+            kind: Kind::Disc,
+            share: 0.5,
+            clipped: false,
+        }
+    }
+
+    #[test]
+    fn angles_and_turns() {
+        let light = light([0.6, 0.0, 0.8]);
+        assert!(light.azimuth().abs() < 1e-6);
+        assert!((light.elevation() - 0.8f32.asin()).abs() < 1e-6);
+        let turned = light.turned(1.0);
+        assert!((turned.azimuth() - 1.0).abs() < 1e-6);
+        assert!((turned.elevation() - light.elevation()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn radiance_over_the_disc_is_the_irradiance() {
+        let light = light([0.0, 0.0, 1.0]);
+        // ∫ dω over the disc by quadrature
+        let n = 10_000;
+        let dt = f64::from(light.radius) / f64::from(n);
+        let solid_angle: f64 =
+            (0..n).map(|k| std::f64::consts::TAU * (dt * (f64::from(k) + 0.5)).sin() * dt).sum();
+        for (l, e) in light.radiance().into_iter().zip(light.irradiance) {
+            assert!((f64::from(l) * solid_angle / f64::from(e) - 1.0).abs() < 1e-5);
+        }
+    }
+}

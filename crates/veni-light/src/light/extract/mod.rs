@@ -1,0 +1,260 @@
+//! The lights of a map, one after the other: found, measured, taken out. LIGHT (1) to (8).
+
+mod level;
+mod measure;
+mod search;
+mod shape;
+mod sun;
+mod vector;
+
+use super::compact::{CompactLight, Kind};
+use super::luminance::luminance;
+use crate::sphere::Equirect;
+use crate::tasks;
+pub(super) use level::Level;
+use level::View;
+use measure::{Measured, core_centre, luminance_of, measure};
+use vector::{angle, dot};
+
+/// Radii of the caps that a light is measured in, degrees.
+const SCALES: [f64; 6] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
+/// The smallest cap in pixels: a disc within one pixel may be spread over two by whoever resampled the map.
+const PIXELS: f64 = 3.0;
+/// From one scale to the next, the excess of a light that the smaller one holds grows by less.
+const GROWTH: f64 = 0.05;
+/// A disc with more than this part of the cap's radius fills it.
+const FULL: f64 = 0.7;
+/// A cap has at least this many cells in its radius.
+const CELLS: f64 = 5.0;
+/// Columns of the coarser resolutions.
+const WIDTHS: [usize; 2] = [1024, 256];
+
+/// So far from where it is said to be, the sun is looked for, degrees.
+const NEAR: f64 = 5.0;
+/// The middle of a light of this extent or less is found on the pixels themselves, degrees.
+const FINE: f64 = 5.0;
+
+/// Which light is the sun.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum SunChoice {
+    /// The strongest above the horizon that looks like one; perhaps none.
+    #[default]
+    Auto,
+    /// The strongest above the horizon, whatever it looks like.
+    Sky,
+    /// The strongest, wherever it is.
+    Any,
+    /// What is brightest near this direction, however faint.
+    Towards([f32; 3]),
+    /// None, and no other light is taken out.
+    Nothing,
+}
+
+/// What is taken for a light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Criteria {
+    pub(super) most: usize,
+    pub(super) share: f64,
+    pub(super) contrast: f64,
+}
+
+/// A map from which lights are taken.
+pub(super) struct Extraction {
+    pixels: Vec<[f32; 3]>,
+    /// Finest first.
+    levels: Vec<Level>,
+}
+
+/// A light that was taken out.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    light: CompactLight,
+    /// Its peak luminance over that of its background.
+    contrast: f64,
+    /// Its peak luminance.
+    peak: f64,
+}
+
+/// What an extraction gives.
+pub(super) struct Extracted {
+    /// The sun first.
+    pub(super) lights: Vec<CompactLight>,
+    /// Whether the first is the sun.
+    pub(super) sun: bool,
+    /// What is left.
+    pub(super) pixels: Vec<[f32; 3]>,
+    /// The same at about 256 columns.
+    pub(super) coarse: Level,
+}
+
+impl Extraction {
+    pub(super) fn new(grid: Equirect, pixels: Vec<[f32; 3]>) -> Self {
+        let mut factors = vec![1];
+        factors.extend(WIDTHS.iter().map(|w| grid.width.div_ceil(*w)).filter(|k| *k > 1));
+        factors.dedup();
+        let levels = factors.into_iter().map(|k| Level::new(grid, &pixels, k)).collect();
+        Self { pixels, levels }
+    }
+
+    /// Takes out lights until none is left that the criteria allow, and decides which is the sun.
+    pub(super) fn run(mut self, criteria: Criteria, choice: SunChoice) -> Extracted {
+        let mut found = Vec::new();
+        let mut sun = None;
+        if let SunChoice::Towards(direction) = choice {
+            if let Some(measured) = self.near(direction) {
+                found.push(self.take(&measured));
+                sun = Some(0);
+            }
+        }
+        let most = if choice == SunChoice::Nothing { 0 } else { criteria.most };
+        while found.len() < most {
+            // a bright pixel among sixteen still stands out, and the seed is only near it
+            let seeds = search::seeds(self.view(1.min(self.levels.len() - 1)), self.coarsest());
+            match self.strongest(&seeds, criteria) {
+                Some(measured) => found.push(self.take(&measured)),
+                None => break,
+            }
+        }
+        // the one that was named stays in front
+        let named = usize::from(sun.is_some());
+        let energy = |f: &Found| luminance(f.light.irradiance);
+        found[named..].sort_by(|a, b| energy(b).total_cmp(&energy(a)));
+        sun = sun.or_else(|| sun::choose(&found, choice, self.coarsest()));
+        if let Some(at) = sun {
+            found[..=at].rotate_right(1);
+        }
+        let lights = found.into_iter().map(|f| f.light).collect();
+        let coarse = self.levels.swap_remove(self.levels.len() - 1).keep(&self.pixels);
+        Extracted { lights, sun: sun.is_some(), pixels: self.pixels, coarse }
+    }
+
+    /// The light at the brightest pixel near a direction, however faint.
+    fn near(&self, direction: [f32; 3]) -> Option<Measured> {
+        let direction = vector::normalised(direction.map(f64::from))?;
+        let radius = NEAR.to_radians().max(PIXELS * self.levels[0].cell_angle());
+        let mut best: Option<(f32, [f64; 3])> = None;
+        self.view(0).cap(direction, radius, |cell| {
+            let y = luminance(cell.radiance);
+            if best.is_none_or(|(most, _)| y > most) {
+                best = Some((y, cell.direction));
+            }
+        });
+        self.settled(best?.1).filter(|m| angle(m.centre, direction) <= radius + m.scale)
+    }
+
+    /// The candidate of the greatest excess.
+    fn strongest(&self, seeds: &[[f64; 3]], criteria: Criteria) -> Option<Measured> {
+        let measured = tasks::map(seeds.iter(), || (), |(), seed| self.settled(*seed));
+        let allowed = measured.into_iter().flatten().filter(|m| {
+            m.contrast() >= criteria.contrast && m.excess >= criteria.share * self.facing(m.centre)
+        });
+        allowed.reduce(|a, b| if b.excess > a.excess { b } else { a })
+    }
+
+    /// A candidate at the scale that holds it, seen from its own middle: a seed may be so far from it that only a wide cap
+    /// reaches it.
+    fn settled(&self, seed: [f64; 3]) -> Option<Measured> {
+        let mut best = self.scaled(seed)?;
+        while let Some(closer) = self.scaled(best.centre).filter(|closer| closer.scale < best.scale) {
+            best = closer;
+        }
+        Some(best)
+    }
+
+    /// A candidate at the scale that holds it: where the excess has stopped growing, the one that stands out most.
+    fn scaled(&self, seed: [f64; 3]) -> Option<Measured> {
+        let pixel = self.levels[0].cell_angle();
+        let mut scales: Vec<f64> =
+            SCALES.iter().map(|s| s.to_radians()).filter(|s| *s > 1.3 * PIXELS * pixel).collect();
+        if PIXELS * pixel <= SCALES[5].to_radians() {
+            scales.insert(0, (PIXELS * pixel).max(SCALES[0].to_radians()));
+        }
+        scales.dedup_by(|a, b| *a < 1.3 * *b);
+        let all: Vec<_> = scales.iter().map(|s| measure(self.for_scale(*s), seed, *s)).collect();
+        let growth = |at: usize| match (all[at], all.get(at + 1)) {
+            (Some(a), Some(Some(b))) => Some(b.excess / a.excess - 1.0),
+            _ => None,
+        };
+        let stands_out =
+            |m: &Measured| m.excess / (m.scale * m.scale * m.background_luminance().max(f64::MIN_POSITIVE));
+        let stopped = (0..all.len()).filter(|at| growth(*at).is_some_and(|g| g < GROWTH));
+        let stopped = stopped.filter_map(|at| Some((all[at]?, all[at + 1])));
+        let stopped = stopped.reduce(|a, b| if stands_out(&b.0) > stands_out(&a.0) { b } else { a });
+        // the rim of a disc that fills the cap lies partly outside
+        let stopped =
+            stopped.and_then(|(m, wider)| if m.filled() > FULL * m.scale { wider } else { Some(m) });
+        stopped.or_else(|| {
+            let growing = (0..all.len()).filter_map(|at| Some((growth(at)?, at)));
+            let slowest = growing.reduce(|a, b| if b.0 < a.0 { b } else { a });
+            // it ends somewhere in the wider of the two
+            slowest.and_then(|s| all[s.1 + 1]).or_else(|| all.iter().flatten().next_back().copied())
+        })
+    }
+
+    /// Replaces what exceeds the background by the background.
+    fn take(&mut self, measured: &Measured) -> Found {
+        let full = self.view(0);
+        let facing = self.facing(measured.centre);
+        let (peak, clipped) = shape::top(full, measured);
+        let mut energy = [0.0; 3];
+        let mut changed = Vec::new();
+        full.cap(measured.centre, measured.scale, |cell| {
+            let rest = [0, 1, 2].map(|c| cell.radiance[c].min(measured.background[c]));
+            for c in 0..3 {
+                energy[c] += cell.solid_angle * (f64::from(cell.radiance[c]) - f64::from(rest[c]));
+            }
+            changed.push((cell.index, rest));
+        });
+        let pixel = self.levels[0].cell_angle();
+        let fine = if measured.scale <= FINE.to_radians() { full } else { self.for_scale(measured.scale) };
+        let (core, spread) = core_centre(fine, measured).unwrap_or((measured.centre, 0.0));
+        // of what is wide, one pixel says little
+        let wide = measured.scale > FINE.to_radians();
+        let over = if wide { measured.peak } else { peak - measured.background_luminance() };
+        let (radius, radius_source) = shape::radius(luminance_of(energy), over, spread, pixel);
+        let direction = if angle(core, measured.centre) < measured.scale { core } else { measured.centre };
+        for (index, rest) in changed {
+            self.pixels[index] = rest;
+        }
+        let rows = self.levels[0].pixel_rows(measured.centre, measured.scale);
+        for level in &mut self.levels {
+            level.refresh(&self.pixels, rows.clone());
+        }
+        let light = CompactLight {
+            direction: direction.map(|c| c as f32),
+            irradiance: energy.map(|e| e as f32),
+            radius: radius as f32,
+            radius_source,
+            kind: Kind::of(radius as f32),
+            share: (luminance_of(energy) / facing).min(1.0) as f32,
+            clipped,
+        };
+        Found { light, contrast: measured.contrast(), peak }
+    }
+
+    /// Irradiance (luminance) of a surface that faces `direction`.
+    fn facing(&self, direction: [f64; 3]) -> f64 {
+        let view = self.coarsest();
+        let cells = (0..view.cells().len()).map(|index| view.cell(index));
+        cells
+            .map(|cell| {
+                let cosine = dot(cell.direction, direction).max(0.0);
+                cell.solid_angle * cosine * f64::from(luminance(cell.radiance))
+            })
+            .sum()
+    }
+
+    fn view(&self, level: usize) -> View<'_> {
+        self.levels[level].view(&self.pixels)
+    }
+
+    fn coarsest(&self) -> View<'_> {
+        self.view(self.levels.len() - 1)
+    }
+
+    /// The coarsest resolution that shows a cap of this radius.
+    fn for_scale(&self, scale: f64) -> View<'_> {
+        let fine = |level: &Level| level.cell_angle() <= scale / CELLS;
+        self.view(self.levels.iter().rposition(fine).unwrap_or(0))
+    }
+}

@@ -1,0 +1,77 @@
+//! Irradiance of an encoded panorama with the lights that were measured in it: √⟨(ln(E/E_true))²⟩ over 26 ways, no alignment.
+
+use rayon::prelude::*;
+use veni_fit::Encoder;
+use veni_image::{Panorama, luminance};
+use veni_light::Result;
+use veni_light::latent::Latent;
+use veni_light::light::{CompactLight, EnvironmentMap, LightOptions};
+use veni_light::model::Model;
+use veni_light::sphere::Equirect;
+
+use super::irradiance::exact;
+use super::panorama;
+
+const GRID: Equirect = Equirect { width: 128, height: 64 };
+const NUMBERS: [usize; 5] = [0, 1, 2, 4, 8];
+
+pub(crate) fn run(files: &[&str]) -> Result<()> {
+    let model = Model::pretrained();
+    let encoder = Encoder::new(&model)?;
+    println!("| lights | whole encoded, lights added | residual encoded, lights added | worst of these |");
+    println!("|---|---|---|---|");
+    for most in NUMBERS {
+        let errors = files
+            .par_iter()
+            .map(|file| {
+                let whole = panorama(file)?;
+                let options = LightOptions { lights: most, ..LightOptions::default() };
+                let light = options.of(whole.environment()?)?;
+                let residual = Panorama::new(whole.grid(), light.residual().pixels().to_vec());
+                let error = |encoded: &Panorama| -> Result<f64> {
+                    let field = decoded(&model, &encoder, encoded)?;
+                    Ok(error(&field, light.lights(), whole.environment()?))
+                };
+                Ok([error(&whole)?, error(&residual)?])
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let rms = |k: usize| (errors.iter().map(|e| e[k] * e[k]).sum::<f64>() / errors.len() as f64).sqrt();
+        let worst = errors.iter().map(|e| e[1]).fold(0.0, f64::max);
+        println!("| {most} | {:.3} | {:.3} | {worst:.3} |", rms(0), rms(1));
+    }
+    Ok(())
+}
+
+/// What the model makes of a panorama.
+fn decoded(model: &Model, encoder: &Encoder, panorama: &Panorama) -> Result<Vec<[f32; 3]>> {
+    let small = panorama.resample(GRID);
+    let log_exposure = small.mean_log_luminance();
+    let image: Vec<f32> = small.log().as_flattened().iter().map(|v| v - log_exposure).collect();
+    let vectors = encoder.encode(GRID, &[&image])?.remove(0).vectors;
+    let latent = Latent { log_exposure, ..Latent::new(vectors) };
+    Ok(model.decoder()?.condition(&latent)?.bake(GRID))
+}
+
+fn error(field: &[[f32; 3]], lights: &[CompactLight], truth: EnvironmentMap<'_>) -> f64 {
+    let ways: Vec<[f32; 3]> = (0..27)
+        .filter(|k| *k != 13)
+        .map(|k| {
+            let v = [k / 9, k / 3 % 3, k % 3].map(|c| c as f32 - 1.0);
+            let length = v.iter().map(|c| c * c).sum::<f32>().sqrt();
+            v.map(|c| c / length)
+        })
+        .collect();
+    let y = |e: [f64; 3]| f64::from(luminance(e.map(|v| v as f32)));
+    let square = |way: &[f32; 3]| {
+        let field = EnvironmentMap::new(GRID, field).map(|map| y(exact(map, *way))).unwrap_or(f64::NAN);
+        let lights: f32 = lights
+            .iter()
+            .map(|l| {
+                let cosine: f32 = l.direction.iter().zip(way).map(|(a, b)| a * b).sum();
+                cosine.max(0.0) * luminance(l.irradiance)
+            })
+            .sum();
+        ((field + f64::from(lights)) / y(exact(truth, *way))).ln().powi(2)
+    };
+    (ways.iter().map(square).sum::<f64>() / ways.len() as f64).sqrt()
+}
