@@ -67,8 +67,8 @@ fn a_run_goes_on_where_its_panoramas_find_room() {
 #[test]
 fn a_set_that_no_disk_holds_is_refused_at_once() {
     let dir = Dir::new();
-    let mut many = vec!["train", "--synthetic", "1000000000000", "--preset", "small", "--out", "run"];
-    dir.refused(&many, &["space", "1000000000000 panoramas", "data.scratch", "data.memory_mib"]);
+    let mut many = vec!["train", "--synthetic", "100000000", "--preset", "small", "--out", "run"];
+    dir.refused(&many, &["space", "100000000 panoramas", "data.scratch", "data.memory_mib"]);
     many.extend(["--set", "data.scratch=\"/nowhere\""]);
     dir.refused(&many, &["/nowhere", "data.scratch"]);
 }

@@ -15,6 +15,7 @@ mod dark_end;
 mod embedded;
 #[cfg(feature = "learn")]
 mod encode;
+mod entries;
 #[cfg(feature = "learn")]
 mod evaluate;
 mod expand_with;
@@ -36,10 +37,15 @@ mod limits;
 #[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-data's tests use the rest of it")]
 mod onnx_file;
+mod outside;
 #[cfg(feature = "pretrained")]
 mod pictures;
+#[cfg(feature = "pretrained")]
+mod pipes;
 #[cfg(feature = "learn")]
 mod prepare;
+#[cfg(feature = "pretrained")]
+mod promises;
 #[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without the learning world"))]
 mod readers;
 #[cfg(feature = "pretrained-large")]
@@ -47,9 +53,13 @@ mod remembered;
 #[cfg(feature = "learn")]
 mod render_probe;
 #[cfg(feature = "learn")]
+mod runs;
+#[cfg(feature = "learn")]
 mod shards;
 #[cfg(feature = "learn")]
 mod synth;
+#[cfg(all(unix, feature = "pretrained"))]
+mod terminal;
 #[cfg(feature = "learn")]
 mod train_devices;
 #[cfg(feature = "learn")]

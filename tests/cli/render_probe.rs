@@ -201,7 +201,7 @@ fn bad_input_is_explained() {
         dir.write(file, text);
         refused(&["--mesh", file], &[file, word]);
     }
-    dir.write("bytes.obj", [0xff, 0xfe, 0x80, b'\n']);
+    dir.write("bytes.obj", [0xff, 0x80, 0xfe, b'\n']);
     refused(&["--mesh", "bytes.obj"], &["bytes.obj", "text"]);
     refused(&["--mesh", "missing.obj"], &["missing.obj", "No such file"]);
     refused(&["--normals", "n.png"], &["n.png", ".exr"]);

@@ -7,6 +7,7 @@ use clap::Args;
 use veni_light::output::Overwrite;
 
 use crate::output::{check, check_distinct, create_folder, named, refuse_existing};
+use crate::piped;
 use crate::shard::Shard;
 
 /// What latent files are called.
@@ -15,7 +16,7 @@ const EXTENSION: &str = "json";
 /// One file, or a folder of them; nothing for stdout.
 #[derive(Args, Debug)]
 pub(crate) struct LatentFiles {
-    /// Latent file to write, for a single input
+    /// Latent file to write, for a single input; - is standard output
     #[arg(long, short, value_name = "OUT.json", conflicts_with = "out_dir")]
     output: Option<PathBuf>,
 
@@ -32,10 +33,11 @@ impl LatentFiles {
             (Some(_), _) if inputs.len() > 1 => {
                 bail!("-o names one file for {} inputs: name a folder with --out-dir DIR", inputs.len())
             }
+            (Some(output), _) if piped::is_stdout(output) => return Ok(Vec::new()),
             (Some(output), _) => vec![output.clone()],
             (None, None) => return Ok(Vec::new()),
             (None, Some(folder)) => {
-                inputs.iter().map(|i| named(folder, i, EXTENSION)).collect::<Result<_>>()?
+                piped::names(inputs).iter().map(|i| named(folder, i, EXTENSION)).collect::<Result<_>>()?
             }
         };
         check_distinct(&names)?;
@@ -51,5 +53,6 @@ impl LatentFiles {
 
 /// What a latent says of the file that it was made from: its name, without the folders of this machine.
 pub(crate) fn source_of(path: &Path) -> String {
+    let path = piped::name(path);
     path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

@@ -1,7 +1,8 @@
 //! `veni-cli`: train, encode, sample and bake natural illumination.
 //!
 //! One file per command in [`commands`]; what they share is beside this file. Results go to stdout,
-//! everything else to stderr; exit codes are 0 (fine), 1 (ran, negative outcome), 2 (error).
+//! everything else to stderr; exit codes are 0 (fine), 1 (ran, negative outcome), 2 (error); a signal ends the process as a
+//! signal does.
 
 #![forbid(unsafe_code)]
 
@@ -12,11 +13,14 @@ mod cli;
 mod commands;
 mod device;
 mod features;
+mod interrupt;
 mod latent_files;
 mod numbers;
 mod output;
 mod part;
 mod picture;
+mod piped;
+mod printable;
 mod progress;
 mod report;
 mod shard;
@@ -31,9 +35,17 @@ use clap::Parser;
 use crate::report::{Outcome, Report};
 
 fn main() -> ExitCode {
-    let cli = cli::Cli::parse();
+    let cli = cli::Cli::try_parse().unwrap_or_else(|error| report::exit_on_usage(&error));
+    interrupt::watch();
     let report = Report::new(cli.json, cli.quiet);
-    match cli.command.run(report) {
+    let result = cli.command.run(report);
+    let code = end(result);
+    piped::clear();
+    code
+}
+
+fn end(result: anyhow::Result<Outcome>) -> ExitCode {
+    match result {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,
         Ok(Outcome::Negative) => ExitCode::from(1),
         Err(error) if report::is_closed_pipe(&error) => ExitCode::SUCCESS,

@@ -126,6 +126,7 @@ pub(crate) fn with_remedy(error: Error) -> anyhow::Error {
     let remedy = match &error {
         Error::Exists { .. } => return anyhow!("{error}; --force replaces it"),
         Error::Layers { .. } => return anyhow!("{error}; {CHOOSE_LAYER}"),
+        Error::Busy { .. } => return anyhow!("{error}; wait until it has ended, or name another folder"),
         Error::LowRange { .. } => return anyhow!("{error}, as 'veni-cli prepare' does"),
         Error::Io { action: "write", source, .. } => match source.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {

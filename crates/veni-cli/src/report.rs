@@ -5,6 +5,9 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
+use crate::piped::renamed;
+use crate::printable::{printable, printable_json, printable_lines};
+
 /// How a command that did not fail ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
@@ -19,11 +22,18 @@ pub(crate) enum Outcome {
 pub(crate) struct Report {
     json: bool,
     quiet: bool,
+    /// Whether an output file goes to stdout, and results to stderr.
+    taken: bool,
 }
 
 impl Report {
     pub(crate) fn new(json: bool, quiet: bool) -> Self {
-        Self { json, quiet }
+        Self { json, quiet, taken: false }
+    }
+
+    /// For a command that writes its file to stdout: results are not to be in it.
+    pub(crate) fn beside_stdout(self) -> Self {
+        Self { taken: true, ..self }
     }
 
     /// Whether results are to be JSON.
@@ -36,28 +46,51 @@ impl Report {
         self.quiet
     }
 
-    /// One result: `human` as it stands, or `value` as one line of JSON.
+    /// One result: the line `human`, or `value` as one line of JSON.
     pub(crate) fn result(self, human: impl Display, value: &impl Serialize) -> anyhow::Result<()> {
-        if self.json {
-            let mut line = serde_json::to_vec(value)?;
-            line.push(b'\n');
-            to_stdout(&line)
-        } else {
-            to_stdout(format!("{human}\n").as_bytes())
+        self.print(&printable(&human.to_string()), value)
+    }
+
+    /// One result of several lines, whose own parts must be [`printable`].
+    pub(crate) fn table(self, human: &str, value: &impl Serialize) -> anyhow::Result<()> {
+        self.print(&printable_lines(human), value)
+    }
+
+    fn print(self, human: &str, value: &impl Serialize) -> anyhow::Result<()> {
+        let line = renamed(if self.json { serde_json::to_string(value)? } else { human.to_owned() });
+        let line = if self.json { printable_json(&line) } else { line.as_str().into() };
+        if self.taken {
+            if self.json || !self.quiet {
+                write_stderr(&format!("{line}\n"));
+            }
+            return Ok(());
         }
+        to_stdout(format!("{line}\n").as_bytes())
     }
 
     /// A remark that is not a result (stderr, silenced by `--quiet`).
     pub(crate) fn note(self, text: impl Display) {
         if !self.quiet {
-            to_stderr(&format!("{text}\n"));
+            complain(&text.to_string());
         }
     }
 }
 
 /// The whole error chain in one line, so that a log keeps it together.
 pub(crate) fn error(error: &anyhow::Error) {
-    to_stderr(&format!("veni-cli: {}\n", one_line(&format!("{error:#}"))));
+    complain(&format!("veni-cli: {}", one_line(&format!("{error:#}"))));
+}
+
+/// Prints what is wrong with the command line, or the help that was asked for, and ends.
+pub(crate) fn exit_on_usage(error: &clap::Error) -> ! {
+    let text = error.render().to_string();
+    let shown = printable_lines(&text);
+    if error.use_stderr() && shown != text {
+        // colours would be lost among what is escaped
+        write_stderr(&shown);
+        std::process::exit(error.exit_code());
+    }
+    error.exit()
 }
 
 /// Does `work` for each item and goes on after errors, unless nobody reads the results any more.
@@ -87,7 +120,12 @@ fn one_line(text: &str) -> String {
     text.lines().map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// Writes and flushes raw bytes to stdout; a reader that went away becomes [`ClosedPipe`].
+/// Lines for stdout that are no result of their own (tables, latents).
+pub(crate) fn lines_to_stdout(text: &str) -> anyhow::Result<()> {
+    to_stdout(printable_lines(text).as_bytes())
+}
+
+/// Writes and flushes bytes as they are to stdout; a reader that went away becomes [`ClosedPipe`].
 pub(crate) fn to_stdout(bytes: &[u8]) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
@@ -97,8 +135,13 @@ pub(crate) fn to_stdout(bytes: &[u8]) -> anyhow::Result<()> {
     }
 }
 
+/// One line for stderr.
+pub(crate) fn complain(line: &str) {
+    write_stderr(&format!("{}\n", printable(&renamed(line.to_owned()))));
+}
+
 /// Nobody may be listening on stderr either, and there is no third place to complain.
-pub(crate) fn to_stderr(text: &str) {
+fn write_stderr(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 

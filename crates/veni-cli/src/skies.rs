@@ -9,7 +9,8 @@ use veni_light::output::Overwrite;
 
 use crate::numbers::{finite, stops};
 use crate::output;
-use crate::report::Report;
+use crate::piped;
+use crate::report::{Report, to_stdout};
 use crate::shard::Shard;
 
 /// Extensions that can be written.
@@ -21,7 +22,7 @@ const MAX_COUNT: u64 = 10_000_000;
 #[derive(Args, Debug)]
 #[group(id = "target", required = true)]
 pub(crate) struct Target {
-    /// Image to write (.exr, .hdr or .png), for a single sky; may be given several times
+    /// Image to write (.exr, .hdr or .png), for a single sky; may be given several times; - is standard output
     #[arg(long, short, value_name = "OUT", conflicts_with = "out_dir")]
     output: Vec<PathBuf>,
 
@@ -37,15 +38,8 @@ pub(crate) struct Many {
     #[arg(long, value_name = "COUNT", requires_all = ["seed", "out_dir"], value_parser = count)]
     count: Option<u64>,
 
-    /// Which files to write for each sky
-    #[arg(
-        long,
-        value_enum,
-        value_name = "FORMAT",
-        value_delimiter = ',',
-        default_value = "exr",
-        requires = "out_dir"
-    )]
+    /// Which files to write for each sky, with --out-dir, or what to write to standard output [default: exr]
+    #[arg(long, value_enum, value_name = "FORMAT", value_delimiter = ',', requires = "target")]
     format: Vec<Format>,
 
     #[command(flatten)]
@@ -102,6 +96,19 @@ impl Format {
 pub(crate) struct Job {
     pub(crate) sky: Sky,
     pub(crate) files: Vec<PathBuf>,
+    /// What is written to standard output instead of files.
+    stdout: Option<Format>,
+}
+
+impl Job {
+    /// Does `work`; what it would write to `-` goes to standard output, and its results then to stderr.
+    pub(crate) fn run(self, report: Report, work: impl FnOnce(&Self, Report) -> Result<()>) -> Result<()> {
+        let Some(format) = self.stdout else { return work(&self, report) };
+        let bytes = piped::output(format.extension(), |path| {
+            work(&Self { files: vec![path.to_path_buf()], ..self }, report.beside_stdout())
+        })?;
+        to_stdout(&bytes)
+    }
 }
 
 /// What a sky is named by.
@@ -109,6 +116,15 @@ pub(crate) struct Job {
 pub(crate) enum Sky {
     File(PathBuf),
     Seed(u64),
+}
+
+impl Sky {
+    pub(crate) fn file(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Seed(_) => None,
+        }
+    }
 }
 
 /// This process's share of the skies in `files`, or of the random ones from `seed` on. Its images are checked before any
@@ -126,25 +142,52 @@ pub(crate) fn jobs(
         None => files.iter().cloned().map(Sky::File).collect(),
     };
     many.shard.note_idle(skies.len(), report);
+    let formats = if many.format.is_empty() { &[Format::Exr] } else { many.format.as_slice() };
     let Some(folder) = &target.out_dir else {
+        let to_stdout = target.output.iter().any(|file| piped::is_stdout(file));
+        if !to_stdout && !many.format.is_empty() {
+            bail!("--format is for --out-dir and for -o -: the names of other images say their format");
+        }
         if skies.len() > 1 {
             bail!("-o names the images of one sky, not of {}: name a folder with --out-dir DIR", skies.len());
         }
-        let jobs = skies.into_iter().map(|sky| Job { sky, files: target.output.clone() });
+        let stdout = to_stdout.then(|| standard(&target.output, formats)).transpose()?;
+        let files = if to_stdout { Vec::new() } else { target.output.clone() };
+        let jobs = skies.into_iter().map(|sky| Job { sky, files: files.clone(), stdout });
         let jobs = many.shard.own(&jobs.collect::<Vec<_>>());
-        if !jobs.is_empty() {
+        if !jobs.is_empty() && !to_stdout {
             output::check(&target.output, &EXTENSIONS, overwrite)?;
         }
-        return Ok(jobs);
+        return with_inputs(jobs);
     };
-    let jobs = skies.into_iter().map(|sky| job(sky, folder, &many.format)).collect::<Result<Vec<_>>>()?;
+    let jobs = skies.into_iter().map(|sky| job(sky, folder, formats)).collect::<Result<Vec<_>>>()?;
     let images = |jobs: &[Job]| jobs.iter().flat_map(|job| job.files.clone()).collect::<Vec<_>>();
     output::check_distinct(&images(&jobs))?;
     let jobs = many.shard.own(&jobs);
     images(&jobs).iter().try_for_each(|file| output::refuse_existing(file, overwrite))?;
     output::create_folder(folder)?;
     output::check(&images(&jobs), &EXTENSIONS, overwrite)?;
-    Ok(jobs)
+    with_inputs(jobs)
+}
+
+/// What goes to standard output, the only output.
+fn standard(outputs: &[PathBuf], formats: &[Format]) -> Result<Format> {
+    let ([_], [format]) = (outputs, formats) else {
+        bail!("-o -: standard output takes one image in one format; name files for others");
+    };
+    piped::check_stdout()?;
+    Ok(*format)
+}
+
+/// Jobs whose skies are in files that can be read as often as needed.
+fn with_inputs(jobs: Vec<Job>) -> Result<Vec<Job>> {
+    let files: Vec<_> = jobs.iter().filter_map(|job| job.sky.file()).map(Path::to_path_buf).collect();
+    let mut files = piped::inputs(&files)?.into_iter();
+    let read = |job: Job| match job.sky {
+        Sky::File(path) => Job { sky: Sky::File(files.next().unwrap_or(path)), ..job },
+        Sky::Seed(_) => job,
+    };
+    Ok(jobs.into_iter().map(read).collect())
 }
 
 fn random(seed: u64, count: u64) -> Result<Vec<Sky>> {
@@ -156,11 +199,11 @@ fn random(seed: u64, count: u64) -> Result<Vec<Sky>> {
 
 fn job(sky: Sky, folder: &Path, formats: &[Format]) -> Result<Job> {
     let name = match &sky {
-        Sky::File(path) => path.clone(),
+        Sky::File(path) => piped::names(std::slice::from_ref(path)).remove(0),
         Sky::Seed(seed) => PathBuf::from(format!("seed-{seed}")),
     };
     let files = formats.iter().map(|f| output::named(folder, &name, f.extension())).collect::<Result<_>>()?;
-    Ok(Job { sky, files })
+    Ok(Job { sky, files, stdout: None })
 }
 
 fn count(text: &str) -> Result<u64, String> {

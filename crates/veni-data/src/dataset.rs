@@ -1,6 +1,5 @@
 //! Panoramas, ready for use.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -71,7 +70,7 @@ impl Dataset {
     /// in memory at their full size at a time, fewer where their pixels are more than [`Budget::shared`].
     ///
     /// # Errors
-    /// The first file (in order) that cannot be read, by name.
+    /// All files that cannot be read, by name; if it is one, what is wrong with it.
     pub fn load(files: &[PathBuf], grid: Equirect) -> Result<Self> {
         Self::load_observed(files, grid, &ReadOptions::default(), &Silent)
     }
@@ -126,7 +125,10 @@ impl Dataset {
     }
 }
 
-/// Reads files, in parallel; each panorama goes through `keep` with its place in the list, and advances the
+/// Most files that one error names.
+const MOST_NAMED: usize = 20;
+
+/// Reads files, in parallel; all that cannot be read are named together. Each panorama goes through `keep` with its place in the list, and advances the
 /// observer by one.
 pub(super) fn load(
     files: &[PathBuf],
@@ -135,34 +137,24 @@ pub(super) fn load(
     keep: impl Fn(usize, Item) -> Result<Item> + Sync,
     observer: &dyn Observer,
 ) -> Result<Vec<Item>> {
-    parallel(files.len(), |at| {
+    let read = parallel(files.len(), |at| {
         let claim = Budget::shared().claim_file(&files[at], options);
-        let item = keep(at, read_item(&files[at], grid, options, observer)?)?;
+        let item = match read_item(&files[at], grid, options, observer) {
+            Ok(item) => Ok(keep(at, item)?),
+            Err(error) => Err(error),
+        };
         drop(claim);
         observer.advance(1);
         Ok(item)
-    })
-}
-
-/// The `.exr` and `.hdr` files directly inside `folder`, sorted by name; a file stands for itself.
-///
-/// # Errors
-/// [`Error::Io`] if the folder cannot be listed.
-pub fn panorama_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    if folder.is_file() {
-        return Ok(vec![folder.to_path_buf()]);
-    }
-    let entries = fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
-    let mut files = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(|e| Error::io(folder, "list", e))?.path();
-        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        if (extension == "exr" || extension == "hdr") && path.is_file() {
-            files.push(path);
+    })?;
+    let (mut items, mut errors) = (Vec::with_capacity(read.len()), Vec::new());
+    for item in read {
+        match item {
+            Ok(item) => items.push(item),
+            Err(error) => errors.push(error),
         }
     }
-    files.sort();
-    Ok(files)
+    if errors.is_empty() { Ok(items) } else { Err(all_of(errors, files.len())) }
 }
 
 fn read_item(path: &Path, grid: Equirect, options: &ReadOptions, observer: &dyn Observer) -> Result<Item> {
@@ -170,6 +162,29 @@ fn read_item(path: &Path, grid: Equirect, options: &ReadOptions, observer: &dyn 
     for note in panorama.notes() {
         observer.note(&format!("{}: {note}", path.display()));
     }
-    whole(&mut panorama).and_then(|()| panorama.sanitise()).map_err(|e| e.in_file(path))?;
+    let bad = whole(&mut panorama).and_then(|()| panorama.sanitise()).map_err(|e| e.in_file(path))?;
+    if bad.nan + bad.infinite > 0 {
+        observer.note(&format!(
+            "{}: {} values that are not a number and {} infinite ones were replaced",
+            path.display(),
+            bad.nan,
+            bad.infinite
+        ));
+    }
     Ok(Item::new(path, &panorama, grid))
+}
+
+/// One error for all files that cannot be used, so that they can be put right at once.
+fn all_of(mut errors: Vec<Error>, files: usize) -> Error {
+    if errors.len() == 1 {
+        return errors.remove(0);
+    }
+    let named: Vec<_> = errors.iter().take(MOST_NAMED).map(Error::with_source).collect();
+    let more = errors.len() - named.len();
+    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+    Error::invalid(format!(
+        "{} of {files} panoramas cannot be used: {}{more}",
+        errors.len(),
+        named.join("; ")
+    ))
 }

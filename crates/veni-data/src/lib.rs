@@ -9,6 +9,7 @@ mod dataset;
 pub mod expand;
 mod fold;
 pub mod limits;
+mod listing;
 pub mod parallel;
 mod pixel_storage;
 mod pixels;
@@ -21,8 +22,9 @@ mod whole;
 pub use veni_light::{Error, Result};
 
 pub use augment::AugmentConfig;
-pub use dataset::{Dataset, Item, panorama_files};
+pub use dataset::{Dataset, Item};
 pub use fold::Fold;
+pub use listing::panorama_files;
 pub use pixel_storage::PixelStorage;
 pub use pixels::Pixels;
 pub use reconstruction::Reconstruction;

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::dataset::{Dataset, Item, load, panorama_files};
+use super::dataset::{Dataset, Item, load};
 use super::fold::Fold;
+use super::listing::panorama_files;
 use super::prepare::capture;
 use super::store::PixelStore;
 use crate::{Error, Result};
@@ -111,13 +112,13 @@ impl Splits {
             let [inner_train, inner_val] = ["train", "val"].map(|n| folder.join(n));
             if inner_train.is_dir() || (config.synthetic > 0 && inner_val.is_dir()) {
                 if inner_train.is_dir() {
-                    train.extend(panorama_files(&inner_train)?);
+                    train.extend(panorama_files(&inner_train, observer)?);
                 }
                 if inner_val.is_dir() {
-                    val.extend(panorama_files(&inner_val)?);
+                    val.extend(panorama_files(&inner_val, observer)?);
                 }
             } else {
-                undecided.extend(panorama_files(folder)?);
+                undecided.extend(panorama_files(folder, observer)?);
             }
         }
         if let Some(fold) = config.fold {

@@ -14,7 +14,7 @@ use serde_json::Value;
 use veni_light::digest::Digest;
 
 use crate::{Error, Result};
-use veni_light::output::{Overwrite, write_atomic};
+use veni_light::output::{Overwrite, below, write_atomic};
 
 /// A folder of kept results.
 #[derive(Clone, Debug)]
@@ -50,7 +50,7 @@ impl Store {
     /// # Errors
     /// [`Error::Io`] if the file cannot be read; [`Error::Invalid`] by name if it is damaged or of another key.
     pub fn get<T: DeserializeOwned>(&self, key: &Key) -> Result<Option<T>> {
-        let path = self.path(key);
+        let path = self.path(key)?;
         let bytes = match fs::read(&path) {
             Ok(bytes) => bytes,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
@@ -74,7 +74,7 @@ impl Store {
     /// # Errors
     /// [`Error::Io`] if it cannot be written.
     pub fn put<T: Serialize>(&self, key: &Key, value: &T) -> Result<()> {
-        let path = self.path(key);
+        let path = self.path(key)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         let kept = Kept { key: key.decides.clone(), value };
@@ -85,11 +85,12 @@ impl Store {
         })
     }
 
-    fn path(&self, key: &Key) -> PathBuf {
+    /// The file of a key, which is in this folder: a link in it leads elsewhere, and is refused.
+    fn path(&self, key: &Key) -> Result<PathBuf> {
         let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
         let name: String = key.name.chars().map(plain).take(80).collect();
         let hash = Digest::of(key.decides.to_string());
-        self.folder.join("results").join(key.protocol).join(format!("{name}-{hash}.json"))
+        below(&self.folder, Path::new("results").join(key.protocol).join(format!("{name}-{hash}.json")))
     }
 }
 
@@ -111,7 +112,7 @@ mod tests {
         store.put(&key(1), &value).unwrap();
         assert_eq!(store.get::<Vec<f32>>(&key(1)).unwrap(), Some(value));
         assert_eq!(store.get::<Vec<f32>>(&key(2)).unwrap(), None);
-        assert!(store.path(&key(1)).starts_with(folder.path().join("results/fit")));
+        assert!(store.path(&key(1)).unwrap().starts_with(folder.path().join("results/fit")));
     }
 
     #[test]
@@ -119,7 +120,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::new(folder.path());
         store.put(&key(1), &1.5f32).unwrap();
-        let path = store.path(&key(1));
+        let path = store.path(&key(1)).unwrap();
         let whole = fs::read(&path).unwrap();
         fs::write(&path, &whole[..whole.len() - 3]).unwrap();
         let message = store.get::<f32>(&key(1)).unwrap_err().to_string();

@@ -37,6 +37,14 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+    /// Another process works in the folder, and only one may.
+    #[error("{}: another process is at work here{}", path.display(), owner.as_ref().map(|o| format!(" ({o})")).unwrap_or_default())]
+    Busy {
+        /// The locked file.
+        path: PathBuf,
+        /// What it left in it.
+        owner: Option<String>,
+    },
     /// The data is, or claims to be, larger than a limit that protects the memory.
     #[error("{0}")]
     TooLarge(String),
@@ -107,6 +115,7 @@ impl Error {
             other @ (Self::Layers { .. }
             | Self::LowRange { .. }
             | Self::Exists { .. }
+            | Self::Busy { .. }
             | Self::Cancelled
             | Self::Io { .. }) => other,
         }

@@ -54,5 +54,6 @@ pub mod progress;
 pub mod random;
 pub mod sphere;
 mod tasks;
+pub mod text;
 
 pub use error::{Error, Result};

@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use crate::text::decode;
 use crate::{Error, Result};
 
 /// Bytes of a model file. The paper's largest model is 88 MB; nothing bigger than this is one of ours, and a wrong path
@@ -63,13 +64,13 @@ pub fn read_file(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>> {
     if bytes.len() as u64 > limit { Err(refuse()) } else { Ok(bytes) }
 }
 
-/// [`read_file`] as text.
+/// [`read_file`] as text ([`text::decode`](crate::text::decode)).
 ///
 /// # Errors
-/// As [`read_file`]; [`Error::Invalid`] if it is not UTF-8.
+/// As [`read_file`]; [`Error::Invalid`] if it is neither UTF-8 nor UTF-16 with its mark.
 pub fn read_text(path: &Path, what: &str, limit: u64) -> Result<String> {
-    String::from_utf8(read_file(path, what, limit)?)
-        .map_err(|_| Error::invalid(format!("not {what} (no text)")).in_file(path))
+    decode(read_file(path, what, limit)?)
+        .map_err(|e| Error::invalid(format!("not {what} ({e})")).in_file(path))
 }
 
 #[cfg(test)]

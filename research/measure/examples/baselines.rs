@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use veni_core::data::Reconstruction;
 use veni_core::data::{Dataset, panorama_files};
 use veni_core::panorama::metrics::Alignment;
+use veni_core::progress::Silent;
 use veni_core::sphere::Equirect;
 use veni_core::{Error, Result};
 use veni_eval::baseline::{Baseline, Kind, Space};
@@ -32,7 +33,7 @@ fn main() -> Result<()> {
     if dimensions.is_empty() {
         return Err(usage());
     }
-    let set = Dataset::load(&panorama_files(Path::new(folder))?, Equirect::new(128, 64))?;
+    let set = Dataset::load(&panorama_files(Path::new(folder), &Silent)?, Equirect::new(128, 64))?;
     if set.is_empty() {
         return Err(Error::invalid(format!("{folder}: no .exr or .hdr panorama")));
     }

@@ -18,6 +18,7 @@ use veni_core::fit::{FitConfig, FitDecoder, FitTarget, fit};
 use veni_core::latent::Latent;
 use veni_core::model::Model;
 use veni_core::panorama::metrics::{Alignment, log_error, scores};
+use veni_core::progress::Silent;
 use veni_core::sphere::Equirect;
 use veni_core::vae::Veni;
 use veni_core::{Error, Result};
@@ -36,7 +37,7 @@ fn main() -> Result<()> {
         weights = vec![0.0, 1e-6, 1e-5, 1e-4, 1e-3];
     }
     let model = Model::load(Path::new(model))?;
-    let set = Dataset::load(&panorama_files(Path::new(folder))?, FULL)?;
+    let set = Dataset::load(&panorama_files(Path::new(folder), &Silent)?, FULL)?;
     let (decoder, prior) = (model.decoder()?, model.prior());
     let veni = Veni::from_model(&model, &Device::flex())?;
     let images: Vec<_> = set.items().iter().map(|item| item.log_radiance.as_slice()).collect();

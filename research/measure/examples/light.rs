@@ -19,6 +19,7 @@ use veni_core::latent::Latent;
 use veni_core::model::Model;
 use veni_core::panorama::luminance;
 use veni_core::panorama::metrics::{Alignment, scores, sun_error};
+use veni_core::progress::Silent;
 use veni_core::sphere::Equirect;
 use veni_core::vae::Veni;
 use veni_core::{Error, Result};
@@ -40,7 +41,7 @@ fn main() -> Result<()> {
         shares = vec![0.0, 0.05, 0.1, 0.2, 0.4];
     }
     let model = Model::load(Path::new(model))?;
-    let set = Dataset::load(&panorama_files(Path::new(folder))?, GRID)?;
+    let set = Dataset::load(&panorama_files(Path::new(folder), &Silent)?, GRID)?;
     println!("| share | LDR PSNR | HDR PSNR | log RMSE | sun | irradiance |");
     println!("|---|---|---|---|---|---|");
     for share in shares {

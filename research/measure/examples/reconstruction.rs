@@ -18,6 +18,7 @@ use veni_core::output::{Overwrite, write_atomic};
 use veni_core::panorama::Panorama;
 use veni_core::panorama::metrics::Alignment;
 use veni_core::panorama::tonemap::Tonemap;
+use veni_core::progress::Silent;
 use veni_core::sphere::Equirect;
 use veni_core::vae::Veni;
 use veni_core::{Error, Result};
@@ -33,7 +34,7 @@ fn main() -> Result<()> {
     };
     let model = Model::load(Path::new(model))?;
     let veni = Veni::from_model(&model, &Device::flex())?;
-    let set = Dataset::load(&panorama_files(Path::new(folder))?, Equirect::new(128, 64))?;
+    let set = Dataset::load(&panorama_files(Path::new(folder), &Silent)?, Equirect::new(128, 64))?;
 
     let loaded = LoadedModel::new("model", model.clone(), &Device::flex())?;
     let encoder = Autoencoder::new(&loaded).ok_or_else(|| Error::invalid("the model has no encoder"))?;

@@ -46,6 +46,7 @@ const DEVICES: &str = "Devices: a graphics card bakes the same picture as the CP
         each oriented as the layers of a cube texture in Vulkan, Direct3D, Metal, OpenGL and WebGPU; the attribute \
         veni:cubeFaces repeats the order. With --frame bevy, z is negated before the lookup, as Bevy's shaders do. \
         Default frame: blender (z up); gltf for cube maps (y up).\n\n\
+        With - in place of a file, latents and images come from standard input and go to standard output.\n\n\
         {}Examples:\n  \
         veni-cli bake --seed 7 -o sky.exr                      a random sky, 1024 x 512, half precision\n  \
         veni-cli bake --seed 7 -o sky.exr -o sky.png --size 4096\n  \
@@ -111,14 +112,13 @@ impl Bake {
         let overwrite = Overwrite::from(self.force);
         let jobs = skies::jobs(&self.latents, self.seed, &self.target, &self.many, overwrite, report)?;
         let picture = Picture::new(self.layout, self.frame, self.size)?;
-        let files = jobs.iter().filter_map(|job| match &job.sky {
-            Sky::File(path) => Some(path.as_path()),
-            Sky::Seed(_) => None,
-        });
+        let files = jobs.iter().filter_map(|job| job.sky.file());
         let loaded = source::model_of(&self.decoding.model, files)?;
         loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
         let device = Device::open(self.decoding.device, &loaded.model, report)?;
-        report::each(jobs, |job| self.one(&job, &picture, &loaded, &device, report))
+        report::each(jobs, |job| {
+            job.run(report, |job, report| self.one(job, &picture, &loaded, &device, report))
+        })
     }
 
     /// One sky to its files.

@@ -14,8 +14,10 @@ use veni_light::sphere::Equirect;
 use crate::args::{Force, Layer, ModelArgs};
 use crate::latent_files::LatentFiles;
 use crate::output::{self, with_remedy};
+use crate::piped;
+use crate::printable::printable_json;
 use crate::progress::Bars;
-use crate::report::{self, Outcome, Report, to_stdout};
+use crate::report::{self, Outcome, Report, lines_to_stdout};
 use crate::shard::Shard;
 use crate::source::{self, Encoded, Encoding};
 
@@ -39,7 +41,7 @@ const PREVIEW: [usize; 2] = [256, 128];
         veni-cli encode sky.exr -o sky.json && veni-cli bake sky.json -o again.exr"
 )]
 pub(crate) struct Encode {
-    /// Equirectangular OpenEXR or Radiance files
+    /// Equirectangular OpenEXR or Radiance files; - is standard input
     #[arg(required = true, value_name = "PANORAMA")]
     panoramas: Vec<PathBuf>,
 
@@ -72,11 +74,13 @@ impl Encode {
         let mut sheet =
             self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
         self.shard.note_idle(self.panoramas.len(), report);
-        let own: Vec<_> = self.panoramas.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)).collect();
+        let own = (0..).zip(&self.panoramas).filter(|(at, _)| self.shard.pick(*at));
+        let (places, own): (Vec<usize>, Vec<PathBuf>) = own.map(|(at, path)| (at, path.clone())).unzip();
+        let own: Vec<_> = places.into_iter().zip(piped::inputs(&own)?).collect();
         let bars = Bars::new(report);
         bars.begin("", "panorama", Some(own.len() as u64));
         let mut failed = Vec::new();
-        for (at, path) in own {
+        for (at, path) in own.iter().map(|(at, path)| (*at, path.as_path())) {
             let encode = || -> Result<Encoded> {
                 let encoded = encoding.encode_file(path, &self.layer, report)?;
                 if let Some(output) = outputs.get(at) {
@@ -147,6 +151,6 @@ fn print(path: &Path, output: Option<&PathBuf>, encoded: &Encoded, report: Repor
             );
             report.result(human, &())
         }
-        None => to_stdout(format!("{text}\n").as_bytes()),
+        None => lines_to_stdout(&format!("{}\n", printable_json(&text))),
     }
 }

@@ -24,8 +24,9 @@ use veni_light::sphere::Equirect;
 use crate::args::Layer;
 use crate::output::with_remedy;
 use crate::part::fold;
+use crate::printable::printable_json;
 use crate::progress::Bars;
-use crate::report::{Outcome, Report, to_stdout};
+use crate::report::{Outcome, Report, lines_to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
 use inputs::BaselineName;
@@ -183,13 +184,13 @@ impl Evaluate {
             );
         }
         let published = self.published.as_deref().map(Published::load).transpose()?.unwrap_or_default();
-        let files = inputs::panoramas(&self.data, self.fold, self.images)?;
+        let bars = Bars::new(report);
+        let files = inputs::panoramas(&self.data, self.fold, self.images, &bars)?;
         inputs::check_folder(&self.out)?;
         let device = DeviceKind::Flex;
         let subjects = inputs::subjects(&self.models, device)?;
         let lpips =
             if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
-        let bars = Bars::new(report);
         let data = Dataset::load_observed(&files, grid, &self.layer.options(), &bars);
         bars.end();
         let data = data.map_err(with_remedy)?;
@@ -246,7 +247,8 @@ impl Evaluate {
             self.save(table, format)?;
         }
         let texts: Vec<_> = found.tables.iter().map(|table| table.render(format)).collect();
-        to_stdout(texts.join(if format == Format::Json { "" } else { "\n" }).as_bytes())?;
+        let texts = texts.join(if format == Format::Json { "" } else { "\n" });
+        lines_to_stdout(&if format == Format::Json { printable_json(&texts) } else { texts.into() })?;
         let figures: Vec<_> = found.figures.iter().filter_map(|f| f.file_name()).collect();
         let figures: Vec<_> = figures.iter().map(|f| f.to_string_lossy()).collect();
         report.note(format_args!(

@@ -22,8 +22,10 @@ use veni_light::sphere::Equirect;
 use crate::args::{Force, ModelArgs};
 use crate::latent_files::{LatentFiles, source_of};
 use crate::output::{self, with_remedy};
+use crate::piped;
+use crate::printable::printable_json;
 use crate::progress::Bars;
-use crate::report::{self, Outcome, Report, to_stdout};
+use crate::report::{self, Outcome, Report, lines_to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
 use crate::source;
@@ -113,7 +115,7 @@ impl Fit {
         let config = self.settings.config(self.shaded.normals.is_some())?;
         let model = FitModel::new(source::model(&self.model)?)?;
         report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
-            self.one(path, outputs.get(at), &model, &config, report)
+            self.one(&piped::input(path)?, outputs.get(at), &model, &config, report)
         })
     }
 
@@ -310,7 +312,9 @@ impl Fit {
             });
             return report.result("", &value);
         }
-        let Some(output) = output else { return to_stdout(format!("{text}\n").as_bytes()) };
+        let Some(output) = output else {
+            return lines_to_stdout(&format!("{}\n", printable_json(&text)));
+        };
         let stops = best.latent.log_exposure / std::f32::consts::LN_2;
         let n = best.latent.vectors.len();
         let quality = match (scores, known) {

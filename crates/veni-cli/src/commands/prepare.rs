@@ -5,6 +5,7 @@ mod expand;
 mod gone;
 mod network;
 mod place;
+mod plan;
 mod record;
 mod report;
 mod scan;
@@ -20,7 +21,7 @@ use veni_light::sphere::Equirect;
 
 use crate::args::{Force, Layer};
 use crate::features::{LEARN, only};
-use crate::report::{Outcome, Report};
+use crate::report::{Outcome, Report, complain};
 use crate::shard::Shard;
 use crate::size::Size;
 use expand::Expand;
@@ -113,6 +114,9 @@ impl Prepare {
         let settings = Settings::new(width, height, expand.as_ref(), network).of_layer(&self.layer);
         let config = PrepareConfig { grid: Equirect::new(width, height), expand, read: self.layer.options() };
         let found = scan::scan(&self.inputs, &self.output)?;
+        for (path, reason) in &found.unreadable {
+            complain(&format!("{}: {reason}", path.display()));
+        }
         if found.sources.is_empty() {
             bail!("{}: no image files in there; name a folder that has some", scan::names(&self.inputs));
         }
@@ -139,7 +143,7 @@ impl Prepare {
         }
         let shares = Shares { val: self.val, test: self.test };
         let placing = Placing { shares, seed: self.seed, resplit: self.resplit };
-        let placed = place::place(&mut store, &placing)?;
+        let placed = place::place(&mut store, &placing, found.unreadable)?;
         contact::write(&store, &placed)?;
         let gone = gone::sources(&placed, &found.sources);
         gone::note(&gone, report);

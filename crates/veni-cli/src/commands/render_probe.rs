@@ -1,6 +1,7 @@
 //! `veni-cli render-probe`: a sphere or a mesh under the light of a panorama or a latent.
 
 mod light;
+mod obj;
 mod shape;
 
 use std::collections::BTreeMap;
@@ -19,10 +20,11 @@ use veni_light::sphere::Equirect;
 use crate::args::{Force, Layer, ModelArgs};
 use crate::numbers::{albedo, elevation, finite, fraction, lights, shininess};
 use crate::output::{self, CAMERA, MATERIAL, with_remedy};
+use crate::piped;
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
 use crate::skies::{self, Change, Job, Many, Sky, Target};
-use shape::Up;
+use obj::Up;
 
 /// Largest image, pixels, for which about 150 bytes each are needed.
 const MAX_PIXELS: usize = 1 << 24;
@@ -133,13 +135,15 @@ impl RenderProbe {
         let size = self.check(&jobs, overwrite)?;
         let angles = [self.azimuth.to_radians(), self.elevation.to_radians()];
         let (surface, camera) = match &self.mesh {
-            Some(path) => shape::mesh(path, self.up, angles, size, report)?,
+            Some(path) => shape::mesh(&piped::input(path)?, self.up, angles, size, report)?,
             None => shape::sphere(angles, size)?,
         };
         let grid = Equirect::new(self.lights, self.lights / 2);
         let transfer = self.transfer(&surface, grid)?;
         let scene = Scene { surface, camera, grid, transfer };
-        report::each(jobs.iter().enumerate(), |(at, job)| self.one(job, &scene, at == 0, report))
+        report::each(jobs.into_iter().enumerate(), |(at, job)| {
+            job.run(report, |job, report| self.one(job, &scene, at == 0, report))
+        })
     }
 
     /// One light; with the `first` also what is the same under all of them.

@@ -1,6 +1,6 @@
 //! `veni-cli sample`: a contact sheet of random skies.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::{Result, bail};
@@ -16,8 +16,9 @@ use veni_light::sphere::Equirect;
 use crate::args::{Decoding, Force};
 use crate::device::Device;
 use crate::output::{self, with_remedy};
+use crate::piped;
 use crate::progress::Bars;
-use crate::report::{Outcome, Report};
+use crate::report::{Outcome, Report, to_stdout};
 use crate::size::Size;
 use crate::source::{self, Loaded};
 
@@ -38,7 +39,7 @@ const MAX_PIXELS: usize = 1 << 28;
         veni-cli sample -o sheet.png --latents skies      also skies/sky-0.json, skies/sky-1.json, …"
 )]
 pub(crate) struct Sample {
-    /// PNG file to write
+    /// PNG file to write; - is standard output
     #[arg(long, short, value_name = "SHEET")]
     output: PathBuf,
 
@@ -98,8 +99,20 @@ impl Grid {
 
 impl Sample {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+        if piped::is_stdout(&self.output) {
+            piped::check_stdout()?;
+            let sheet = piped::output("png", |path| self.sheet(path, report.beside_stdout()))?;
+            to_stdout(&sheet)?;
+        } else {
+            output::check(std::slice::from_ref(&self.output), &["png"], Overwrite::from(self.force))?;
+            self.sheet(&self.output, report)?;
+        }
+        Ok(Outcome::Fine)
+    }
+
+    /// Writes the sheet to `path`.
+    fn sheet(&self, path: &Path, report: Report) -> Result<()> {
         let overwrite = Overwrite::from(self.force);
-        output::check(std::slice::from_ref(&self.output), &["png"], overwrite)?;
         let (grid, count) = self.grid()?;
         let (width, height) = self.size.equirect()?;
         if grid.columns.saturating_mul(width).saturating_mul(grid.rows * height) > MAX_PIXELS {
@@ -135,17 +148,17 @@ impl Sample {
             bars.add(1);
         }
         bars.end();
-        sheet.write(&self.output, overwrite).map_err(with_remedy)?;
+        sheet.write(path, overwrite).map_err(with_remedy)?;
         let Grid { columns, rows } = grid;
         let human = format!(
             "{}: {count} skies, seeds {} to {last}, {columns} x {rows} row by row (on {})",
-            self.output.display(),
+            path.display(),
             self.seed,
             device.name()
         );
         let latents: Vec<_> = files.iter().map(|f| f.display().to_string()).collect();
         let value = json!({
-            "file": self.output.display().to_string(),
+            "file": path.display().to_string(),
             "first_seed": self.seed,
             "count": count,
             "columns": columns,
@@ -154,8 +167,7 @@ impl Sample {
             "device": device.name(),
             "latents": latents,
         });
-        report.result(human, &value)?;
-        Ok(Outcome::Fine)
+        report.result(human, &value)
     }
 
     fn grid(&self) -> Result<(Grid, usize)> {

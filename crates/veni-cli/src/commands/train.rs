@@ -7,11 +7,9 @@ mod folder;
 mod pixel_storage;
 mod resume;
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Result, anyhow, bail};
 use serde_json::json;
 use veni_core::train::config::TrainConfig;
 use veni_core::train::init::Initialised;
@@ -20,9 +18,10 @@ use veni_light::Error;
 use veni_light::model::ModelKind;
 
 use crate::commands::inspect::run::{self, Best};
+use crate::interrupt;
 use crate::output::with_remedy;
 use crate::progress::{Bars, duration};
-use crate::report::{Outcome, Report, to_stderr};
+use crate::report::{Outcome, Report};
 use args::TrainDevice;
 use command_line::shell_word;
 
@@ -35,6 +34,11 @@ impl Train {
         let mut trainer = if self.resume { self.continued(report)? } else { self.begun(report)? };
         note_device(trainer.config(), report)?;
         note_file(&trainer, report);
+        if !trainer.is_locked() {
+            let out = self.out.display();
+            report
+                .note(format_args!("{out}: this file system has no locks: let no other process train in it"));
+        }
         if trainer.initialised() == Some(Initialised::Decoder) {
             let model = trainer.config().init.as_ref().map(|init| init.model.display().to_string());
             report.note(format_args!(
@@ -47,9 +51,9 @@ impl Train {
                 }
             ));
         }
-        let stop = stop_on_signal()?;
+        let stop = interrupt::tell("stopping after this step and writing a checkpoint (again: end at once)");
         let bars = Bars::new(report);
-        let finish = trainer.run(&stop, &mut &bars).map_err(with_remedy)?;
+        let finish = trainer.run(stop, &mut &bars).map_err(with_remedy)?;
         bars.end();
         let (done, total) = (trainer.steps_done(), trainer.config().steps);
         let best = run::best(&self.out)?;
@@ -67,16 +71,16 @@ impl Train {
     /// A new run.
     fn begun(&self, report: Report) -> Result<Trainer> {
         let config = self.settings()?;
-        let replace = self.check_folder()?;
+        let replaced = self.check_folder()?;
         let bars = Bars::new(report);
         let trainer = Trainer::prepare(&self.out, config, &self.command_line(), &bars);
         bars.end();
-        let trainer = trainer.map_err(|e| self.with_options(e))?;
-        if replace {
+        let mut trainer = trainer.map_err(|e| self.with_options(e))?;
+        if replaced.is_some() {
             // what is there goes only now, when the new data is known to be good
             self.clear()?;
         }
-        trainer.begin().map_err(with_remedy)?;
+        trainer.begin(replaced).map_err(with_remedy)?;
         Ok(trainer)
     }
 
@@ -176,18 +180,4 @@ fn note_device(config: &TrainConfig, report: Report) -> Result<()> {
         report.note("decoder_by = kernels: the decoder is computed by the processor, not on the device");
     }
     Ok(())
-}
-
-/// Raised by the first Ctrl-C (or a request to terminate); the second one ends the process.
-fn stop_on_signal() -> Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        to_stderr("stopping after this step and writing a checkpoint (again: end at once)\n");
-    })
-    .context("cannot watch for Ctrl-C")?;
-    Ok(stop)
 }

@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::report::{Report, to_stderr};
+use crate::printable::printable;
+use crate::report::{Report, complain};
 
 /// Work shorter than this shows no progress at all.
 const PATIENCE: Duration = Duration::from_millis(700);
@@ -69,7 +70,8 @@ impl Bar {
                 }
                 self.shown = Some(Instant::now());
                 let detail = detail();
-                bar.set_message(if detail.is_empty() { detail } else { format!(" · {detail}") });
+                let message = if detail.is_empty() { detail } else { format!(" · {}", printable(&detail)) };
+                bar.set_message(message);
                 bar.set_position(done);
             }
             View::Lines => {
@@ -78,7 +80,7 @@ impl Bar {
                 }
                 self.shown = Some(Instant::now());
                 let line = line(&self.unit, done, self.first, self.total, waited, &detail());
-                to_stderr(&format!("{line}\n"));
+                complain(&line);
             }
         }
     }
@@ -87,8 +89,8 @@ impl Bar {
     pub(super) fn note(&self, text: &str) {
         match &self.view {
             View::Silent => {}
-            View::Bar(bar) if self.shown.is_some() => bar.println(text),
-            View::Bar(_) | View::Lines => to_stderr(&format!("{text}\n")),
+            View::Bar(bar) if self.shown.is_some() => bar.println(printable(text)),
+            View::Bar(_) | View::Lines => complain(text),
         }
     }
 

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use veni_light::Error;
 use veni_light::latent::Latent;
 use veni_light::model::Model;
+use veni_light::text::begins_object;
 
 use super::model::{Loaded, embedded, model};
 use super::remembered::is_of_its_pixels;
@@ -134,5 +135,5 @@ pub(crate) fn is_latent(path: &Path) -> Result<bool> {
     let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
     file.take(64).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
     let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    Ok(named || start.trim_ascii_start().starts_with(b"{"))
+    Ok(named || begins_object(&start))
 }

@@ -8,6 +8,7 @@ use anyhow::{Result, bail};
 use veni_light::model::Model;
 
 use crate::args::ModelArgs;
+use crate::piped;
 
 /// A model and what to call it in messages.
 pub(crate) struct Loaded {
@@ -23,7 +24,7 @@ pub(crate) fn model(args: &ModelArgs) -> Result<Loaded> {
     if let Some(dimension) = size(path) {
         return embedded(dimension);
     }
-    let path = model_file(path)?;
+    let path = piped::input(&model_file(path)?)?;
     Ok(Loaded { model: Model::load(&path)?, name: path.display().to_string() })
 }
 

@@ -14,6 +14,7 @@ use veni_light::output::{Overwrite, write_atomic};
 pub(super) struct MetricsLog {
     path: PathBuf,
     file: File,
+    validated: bool,
 }
 
 impl MetricsLog {
@@ -24,15 +25,22 @@ impl MetricsLog {
     /// # Errors
     /// [`Error::Io`] if the file cannot be read or written.
     pub(super) fn open(path: &Path, step: u64, total: u64) -> Result<Self> {
+        let mut validated = false;
         if path.exists() {
-            let lines = kept(path, step, total)?;
+            let (lines, has_validation) = kept(path, step, total)?;
+            validated = has_validation;
             write_atomic(path, Overwrite::Replace, |out| {
                 lines.iter().try_for_each(|l| writeln!(out, "{l}")).map_err(|e| Error::io(path, "write", e))
             })?;
         }
         let file = OpenOptions::new().create(true).append(true).open(path);
         let file = file.map_err(|e| Error::io(path, "create", e))?;
-        Ok(Self { path: path.to_path_buf(), file })
+        Ok(Self { path: path.to_path_buf(), file, validated })
+    }
+
+    /// Whether the log had the validation after the last update when it was opened.
+    pub(super) fn is_validated(&self) -> bool {
+        self.validated
     }
 
     /// Appends one record.
@@ -56,18 +64,20 @@ impl MetricsLog {
     }
 }
 
-fn kept(path: &Path, step: u64, total: u64) -> Result<Vec<String>> {
+/// The lines up to update `step`, and whether its validation is among them.
+fn kept(path: &Path, step: u64, total: u64) -> Result<(Vec<String>, bool)> {
     let file = fs::File::open(path).map_err(|e| Error::io(path, "read", e))?;
-    let mut lines = Vec::new();
+    let (mut lines, mut validated) = (Vec::new(), false);
     for line in BufReader::new(file).lines() {
         let line = line.map_err(|e| Error::io(path, "read", e))?;
         let Ok(record) = serde_json::from_str::<serde_json::Value>(&line) else { continue };
         let last = |at: u64| at == total && record.get("validation").is_some();
         if record["step"].as_u64().is_some_and(|at| at <= step && !last(at)) {
+            validated |= record["step"].as_u64() == Some(step) && record.get("validation").is_some();
             lines.push(line);
         }
     }
-    Ok(lines)
+    Ok((lines, validated))
 }
 
 #[cfg(test)]

@@ -6,6 +6,8 @@
 //! | `metrics.jsonl` | a line per update and per validation |
 //! | `checkpoint/state.safetensors` | weights, Adam's moments, averaged weights, step |
 //! | `preview/step-*.png` | target, reconstruction, random sample |
+//! | `command.txt` | the command that began the run |
+//! | `.lock` | locked by the process that trains |
 //! | `model.safetensors` | the averaged weights that validated best, with the prior of the training latents |
 //! | `latents.safetensors` | of an auto-decoder: the latent table of these weights (see [`latents::save`](crate::train::latents::save)) |
 //!
@@ -31,11 +33,13 @@ use crate::train::replicas::{Computed, Replicas};
 use crate::vae::weights;
 use crate::{Error, Result};
 use veni_data::{Dataset, Splits};
+use veni_light::output::Lock;
 
 mod begin;
+mod folder;
 mod results;
 
-pub use begin::{is_free, leftovers};
+pub use folder::{is_free, leftovers, lock};
 
 /// Batches prepared ahead of the one being computed.
 const AHEAD: usize = 2;
@@ -53,6 +57,8 @@ pub enum Finish {
 #[derive(Debug)]
 pub struct Trainer {
     folder: PathBuf,
+    /// Nobody else trains in the folder.
+    lock: Option<Lock>,
     config: TrainConfig,
     /// Of the run's own `data`.
     splits: Splits,
@@ -96,12 +102,18 @@ impl Trainer {
         self.replicas.first()
     }
 
+    /// Whether nobody else can train in the run's folder: not where a file system knows no locks.
+    pub fn is_locked(&self) -> bool {
+        self.lock.as_ref().is_some_and(Lock::is_held)
+    }
+
     /// What a run that was just created has from `config.init`.
     pub fn initialised(&self) -> Option<Initialised> {
         self.initialised
     }
 
-    /// Trains until all updates are made or `stop` is raised, which is looked at before every update.
+    /// Trains until all updates are made or `stop` is raised, which is looked at before every update and between the
+    /// panoramas of a validation.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the loss is no longer finite; [`Error::Io`] if a file of the run cannot be written.
@@ -109,6 +121,9 @@ impl Trainer {
         let total = self.config.steps;
         let mut log = MetricsLog::open(&self.folder.join("metrics.jsonl"), self.steps_done(), total)?;
         progress.start(self.steps_done(), total);
+        if self.catch_up(stop, &mut log, progress)? == Finish::Stopped {
+            return Ok(Finish::Stopped);
+        }
         for at in 0..self.stages.len() {
             if self.stages[at].stage.end() > self.steps_done()
                 && self.stage(at, stop, progress, &mut log)? == Finish::Stopped
@@ -118,8 +133,35 @@ impl Trainer {
             // a stage's panoramas go with it
             self.stages[at].data = None;
         }
-        self.finish(&mut log, progress)?;
-        Ok(Finish::Complete)
+        // the checkpoint of the last update is written: what is stopped here is done again
+        stopped_or(self.finish(stop, &mut log, progress))
+    }
+
+    /// The validation and the preview of the update that was made last, if the run was stopped in the midst of them.
+    fn catch_up(
+        &mut self,
+        stop: &AtomicBool,
+        log: &mut MetricsLog,
+        progress: &mut dyn Progress,
+    ) -> Result<Finish> {
+        let step = self.steps_done();
+        if step == 0 || step == self.config.steps {
+            return Ok(Finish::Complete);
+        }
+        let mut done = Ok(());
+        if self.validates(step) && !log.is_validated() {
+            done = self.validate(stop, log, progress);
+        }
+        if done.is_ok() && due(step, self.config.report.preview_every) && !self.preview_path().exists() {
+            done = self.preview(stop, progress);
+        }
+        stopped_or(done)
+    }
+
+    /// Whether the run is validated after update `step`.
+    fn validates(&self, step: u64) -> bool {
+        due(step, self.config.report.validate_every)
+            || self.stages.iter().any(|running| running.stage.end() == step)
     }
 
     fn stage(
@@ -155,7 +197,6 @@ impl Trainer {
         let total = self.config.steps;
         let mut pace = None;
         let report = self.config.report;
-        let due = |step: u64, every: u64| every > 0 && step.is_multiple_of(every);
         for batch in batches {
             if stop.load(Ordering::Relaxed) {
                 self.checkpoint(log, progress)?;
@@ -168,11 +209,16 @@ impl Trainer {
             let step = update.step;
             log.append(&update)?;
             progress.step(&update, mean * (total - step) as f64);
-            if (due(step, report.validate_every) || step == stage.end()) && step != total {
-                self.validate(log, progress)?;
+            let mut looked = Ok(());
+            if self.validates(step) && step != total {
+                looked = self.validate(stop, log, progress);
             }
-            if due(step, report.preview_every) && step != total {
-                self.preview(progress)?;
+            if looked.is_ok() && due(step, report.preview_every) && step != total {
+                looked = self.preview(stop, progress);
+            }
+            if stopped_or(looked)? == Finish::Stopped {
+                self.checkpoint(log, progress)?;
+                return Ok(Finish::Stopped);
             }
             if due(step, report.checkpoint_every) || step == stage.end() {
                 self.checkpoint(log, progress)?;
@@ -224,6 +270,25 @@ impl Trainer {
 
     fn checkpoint_path(&self) -> PathBuf {
         checkpoint_path(&self.folder)
+    }
+
+    /// The preview after the last update.
+    fn preview_path(&self) -> PathBuf {
+        self.folder.join("preview").join(format!("step-{:06}.png", self.steps_done()))
+    }
+}
+
+/// Whether something is done every so many updates is done after this one; never if `every` is 0.
+fn due(step: u64, every: u64) -> bool {
+    every > 0 && step.is_multiple_of(every)
+}
+
+/// A cancelled piece of work is a run that was stopped.
+fn stopped_or(done: Result<()>) -> Result<Finish> {
+    match done {
+        Ok(()) => Ok(Finish::Complete),
+        Err(Error::Cancelled) => Ok(Finish::Stopped),
+        Err(error) => Err(error),
     }
 }
 

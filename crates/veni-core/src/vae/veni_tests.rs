@@ -42,7 +42,8 @@ impl Setup {
         let veni = Veni::new(&config, &mut Stream::from_seed(5), &Device::flex()).unwrap();
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/panoramas/val");
         let grid = Equirect::new(128, 64);
-        let set = Dataset::load(&panorama_files(&folder).unwrap()[..2], grid).unwrap();
+        let set = Dataset::load(&panorama_files(&folder, &veni_light::progress::Silent).unwrap()[..2], grid)
+            .unwrap();
         let images = set.items().iter().map(|item| item.log_radiance.to_vec()).collect();
         Self { veni, grid, images }
     }

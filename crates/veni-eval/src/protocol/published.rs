@@ -33,8 +33,9 @@ impl Published {
         if size > MAX_BYTES {
             return Err(Error::too_large("too large for a file of published numbers").in_file(path));
         }
-        let text = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
-        serde_json::from_slice(&text).map_err(|e| {
+        let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+        let text = veni_light::text::decode(bytes).map_err(|e| e.in_file(path))?;
+        serde_json::from_str(&text).map_err(|e| {
             Error::invalid(format!("no published numbers, {{table: {{row: {{column: number}}}}}} ({e})"))
                 .in_file(path)
         })

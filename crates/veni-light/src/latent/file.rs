@@ -79,7 +79,7 @@ impl Latent {
         Ok(latent)
     }
 
-    /// Reads a latent file.
+    /// Reads a latent file; a byte order mark, and UTF-16 behind one, is read too.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be read; otherwise as [`Latent::from_json`], also for a file larger than

@@ -6,7 +6,7 @@ use veni_light::sphere::Equirect;
 
 use super::cases::Case;
 use super::measure::Measured;
-use crate::report::{Report, to_stdout};
+use crate::report::{Report, lines_to_stdout};
 
 /// Widths of the columns that depend on what is measured.
 pub(super) struct Table {
@@ -43,7 +43,7 @@ impl Table {
         let start = self.start("device", "model", "N", "size");
         let line =
             format!("{start}{:>12}{:>16}{:>11}{:>16}\n", "ms", "Mdirections/s", "GFLOP/s", "of its FMA rate");
-        to_stdout(line.as_bytes())
+        lines_to_stdout(&line)
     }
 
     pub(super) fn row(&self, row: &Row<'_>, report: Report) -> Result<()> {

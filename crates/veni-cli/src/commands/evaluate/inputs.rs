@@ -11,7 +11,8 @@ use veni_data::{Fold, panorama_files};
 use veni_eval::baseline::Kind;
 use veni_eval::codec::Basis;
 use veni_light::Error;
-use veni_light::output::{Overwrite, existing_above, write_atomic};
+use veni_light::output::{Overwrite, below, existing_above, write_atomic};
+use veni_light::progress::Observer;
 
 use crate::args::ModelArgs;
 use crate::output::{with_remedy, writable};
@@ -95,12 +96,17 @@ fn named(text: &str) -> Result<(String, Option<PathBuf>)> {
 
 /// The panorama files, by name; of a folder with `val/` inside those in it. With a fold, what it holds back of those in
 /// `train/`.
-pub(super) fn panoramas(data: &[PathBuf], fold: Option<Fold>, most: Option<usize>) -> Result<Vec<PathBuf>> {
+pub(super) fn panoramas(
+    data: &[PathBuf],
+    fold: Option<Fold>,
+    most: Option<usize>,
+    observer: &dyn Observer,
+) -> Result<Vec<PathBuf>> {
     let side = if fold.is_some() { "train" } else { "val" };
     let mut files = Vec::new();
     for folder in data {
         let inner = folder.join(side);
-        files.extend(panorama_files(if inner.is_dir() { &inner } else { folder })?);
+        files.extend(panorama_files(if inner.is_dir() { &inner } else { folder }, observer)?);
     }
     files.sort();
     files.dedup();
@@ -122,6 +128,10 @@ pub(super) fn check_folder(out: &Path) -> Result<()> {
     }
     if !out.is_dir() {
         bail!("{}: is a file; name a folder for the evaluation with --out", out.display());
+    }
+    // tables and figures replace those of an earlier run, here and nowhere else
+    for folder in ["figures", "results"] {
+        below(out, folder)?;
     }
     // a shard that begins at the same time may be writing the marker: hidden files say nothing
     let entries = std::fs::read_dir(out).map_err(|e| Error::io(out, "list", e))?;

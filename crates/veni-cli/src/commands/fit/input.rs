@@ -18,7 +18,7 @@ const LONGEST: usize = 96;
 
 #[derive(Args, Debug)]
 pub(crate) struct Input {
-    /// OpenEXR, Radiance, PNG, JPEG or WebP files
+    /// OpenEXR, Radiance, PNG, JPEG or WebP files; - is standard input
     #[arg(required = true, value_name = "PICTURE")]
     pub(super) pictures: Vec<PathBuf>,
 

@@ -34,7 +34,7 @@ pub(super) fn run(report: Report) -> Result<Outcome> {
                 facts.add("error", format!("cannot be used: {error}"), error.to_string());
             }
         }
-        report.result(facts.text(&name), &facts.json("device", &name))?;
+        report.table(&facts.text(&name), &facts.json("device", &name))?;
     }
     Ok(outcome)
 }

@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 
 use serde_json::{Map, Value};
 
+use crate::printable::printable;
+
 /// What a path or a device turned out to be, and its properties in the order to show them.
 pub(super) struct Facts {
     kind: &'static str,
@@ -45,11 +47,11 @@ impl Facts {
 
     /// All of it below a title: "name: kind".
     pub(super) fn text(&self, name: &str) -> String {
-        let mut text = format!("{name}: {}", self.kind);
+        let mut text = format!("{}: {}", printable(name), self.kind);
         let width = self.rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
         for (name, value) in &self.rows {
             // writing to a String cannot fail
-            let _ = write!(text, "\n  {name:width$}  {value}");
+            let _ = write!(text, "\n  {name:width$}  {}", printable(value));
         }
         text
     }

@@ -20,9 +20,11 @@ use clap::Args;
 use veni_image::LdrPanorama;
 use veni_image::texture::{EnvHeader, Ktx2Header};
 use veni_light::Error;
+use veni_light::text::begins_object;
 
 use crate::args::Layer;
 use crate::features::{GPU, only};
+use crate::piped;
 use crate::report::{self, Outcome, Report};
 use facts::Facts;
 
@@ -56,7 +58,7 @@ const DEVICES: &str = "\n\nWith --devices: every graphics device that could bake
         only(GPU, "\n  veni-cli inspect --devices"))
 )]
 pub(crate) struct Inspect {
-    /// Files, or folders of training runs
+    /// Files, or folders of training runs; - is standard input
     #[cfg_attr(feature = "gpu", arg(required_unless_present = "devices"))]
     #[cfg_attr(not(feature = "gpu"), arg(required = true))]
     #[arg(value_name = "FILE")]
@@ -77,10 +79,10 @@ impl Inspect {
         if self.devices {
             return devices::run(report);
         }
-        report::each(&self.files, |path| {
+        report::each(piped::inputs(&self.files)?, |path| {
             let name = path.display().to_string();
-            let facts = describe(path, &self.layer)?;
-            report.result(facts.text(&name), &facts.json("file", &name))
+            let facts = describe(&path, &self.layer)?;
+            report.table(&facts.text(&name), &facts.json("file", &name))
         })
     }
 }
@@ -99,7 +101,7 @@ fn describe(path: &Path, layer: &Layer) -> Result<Facts> {
         [_, _, _, _, _, 0, 0, 0, b'{', ..] => model::describe(path),
         start if Ktx2Header::recognises(start) => texture::ktx2(path),
         start if EnvHeader::recognises(start) => texture::env(path),
-        text if text.trim_ascii_start().starts_with(b"{") => latent::describe(path),
+        text if begins_object(text) => latent::describe(path),
         _ if LdrPanorama::recognise(path)? => display::describe(path),
         _ => image::describe(path, layer),
     }

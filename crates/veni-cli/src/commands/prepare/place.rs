@@ -1,6 +1,7 @@
 //! Which files are kept, under which name and on which side.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use anyhow::Result;
 use veni_data::prepare::{Bond, Member, Shares, Split, assign, group};
@@ -30,19 +31,24 @@ pub(super) struct Placed {
     pub(super) kept: Vec<Kept>,
     /// Files with the very bytes of a kept one: the record, and the kept one's source.
     pub(super) duplicates: Vec<(Record, String)>,
-    pub(super) refused: Vec<(Record, String)>,
+    /// Sources, or what could not even be looked at, and why.
+    pub(super) refused: Vec<(String, String)>,
     /// Pairs of sources that look alike.
     pub(super) alike: Vec<(String, String, Bond)>,
 }
 
 /// Groups, splits, names and moves the images.
-pub(super) fn place(store: &mut Store, placing: &Placing) -> Result<Placed> {
+pub(super) fn place(
+    store: &mut Store,
+    placing: &Placing,
+    unreadable: Vec<(PathBuf, String)>,
+) -> Result<Placed> {
     let mut first: BTreeMap<String, String> = BTreeMap::new();
     let (mut fit, mut duplicates, mut refused) = (Vec::new(), Vec::new(), Vec::new());
     for record in store.records() {
         let record = record.clone();
         match &record.fate {
-            Fate::Refused(reason) => refused.push((record.clone(), reason.clone())),
+            Fate::Refused(reason) => refused.push((record.source.clone(), reason.clone())),
             Fate::Fit(facts) => match first.get(&facts.id) {
                 Some(source) => duplicates.push((record.clone(), source.clone())),
                 None => {
@@ -52,6 +58,8 @@ pub(super) fn place(store: &mut Store, placing: &Placing) -> Result<Placed> {
             },
         }
     }
+    refused.extend(unreadable.into_iter().map(|(path, reason)| (path.display().to_string(), reason)));
+    refused.sort();
     let captures: Vec<String> = fit.iter().map(Record::capture).collect();
     let members: Vec<Member<'_>> = (fit.iter().zip(&captures))
         .filter_map(|(r, capture)| Some(Member { capture, fingerprint: &r.facts()?.fingerprint }))

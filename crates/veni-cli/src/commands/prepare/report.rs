@@ -11,6 +11,7 @@ use veni_data::prepare::Split;
 use super::place::{Kept, Placed, Placing};
 use super::record::Record;
 use super::store::{Settings, Store, write_bytes, write_json};
+use crate::printable::printable;
 use crate::report::{Outcome, Report};
 
 pub(super) fn write(
@@ -28,7 +29,7 @@ pub(super) fn write(
     }));
     files.extend(
         (placed.refused.iter())
-            .map(|(record, reason)| json!({"source": record.source, "fate": "refused", "reason": reason})),
+            .map(|(source, reason)| json!({"source": source, "fate": "refused", "reason": reason})),
     );
     files.extend(
         ignored
@@ -62,7 +63,7 @@ pub(super) fn write(
 /// The result of the command; files that were refused make it a negative one.
 pub(super) fn print(output: &Path, placed: &Placed, gone: &[String], report: Report) -> Result<Outcome> {
     let refused: Vec<Value> =
-        placed.refused.iter().map(|(r, reason)| json!({"source": r.source, "reason": reason})).collect();
+        placed.refused.iter().map(|(source, reason)| json!({"source": source, "reason": reason})).collect();
     let mut value = counts(placed, 0, gone.len());
     if let Value::Object(map) = &mut value {
         map.remove("ignored");
@@ -153,7 +154,11 @@ fn markdown(
         ignored.len()
     )?;
     section(&mut out, "Kept, though their sources are gone", gone.iter().cloned())?;
-    section(&mut out, "Refused", placed.refused.iter().map(|(r, reason)| format!("{}: {reason}", r.source)))?;
+    section(
+        &mut out,
+        "Refused",
+        placed.refused.iter().map(|(source, reason)| format!("{source}: {reason}")),
+    )?;
     section(
         &mut out,
         "Duplicates, byte for byte",
@@ -204,7 +209,7 @@ fn section(out: &mut String, title: &str, lines: impl Iterator<Item = String>) -
         if at == 0 {
             writeln!(out, "\n## {title}\n")?;
         }
-        writeln!(out, "- {line}")?;
+        writeln!(out, "- {}", printable(&line))?;
     }
     Ok(())
 }

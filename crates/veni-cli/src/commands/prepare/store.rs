@@ -5,6 +5,7 @@
 //! | `settings.json` | what the images depend on; other settings need `--force` |
 //! | `records*.jsonl` | one line per examined file, appended as it is done |
 //! | `images/ID.exr` | prepared images that are not placed yet |
+//! | `lock` | locked while a run is at work here |
 //! | `plan.json` | where each image is, or is being moved: former places, then the wanted one |
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,13 +19,14 @@ use serde::{Deserialize, Serialize};
 use veni_data::prepare::Expander;
 use veni_image::Transfer;
 use veni_light::Error;
-use veni_light::output::{Overwrite, write_atomic};
+use veni_light::output::{Lock, Overwrite, below, name_new, write_atomic};
 
 use super::network::NetworkSettings;
+use super::plan::{self, LOCK, OWN, Plan};
 use super::record::Record;
 use super::scan::Source;
 use crate::args::Layer;
-use crate::output::{PROBE, writable};
+use crate::output::{PROBE, with_remedy, writable};
 use crate::shard::Shard;
 
 /// Changes when images, fingerprints or records of an older program can no longer be gone on with.
@@ -54,7 +56,9 @@ pub(super) struct Store {
     log: File,
     log_path: PathBuf,
     /// Places of images, relative to the folder, by their id.
-    plan: BTreeMap<String, Vec<String>>,
+    plan: Plan,
+    /// Held while the folder is worked in: by one process, or by shards together.
+    _lock: Lock,
 }
 
 impl Settings {
@@ -93,7 +97,7 @@ impl Store {
     /// Opens the folder, or makes it. Refuses one that holds other things or was made with other settings; with
     /// `force` it removes what an earlier run wrote and starts over.
     pub(super) fn open(root: &Path, settings: &Settings, force: bool, shard: Shard) -> Result<Self> {
-        let own = root.join(".prepare");
+        let own = root.join(OWN);
         if root.exists() && !root.is_dir() {
             bail!("{}: is a file; name a folder", root.display());
         }
@@ -103,7 +107,7 @@ impl Store {
             // another shard may have begun this very moment
             let is_ours = |name: &OsString| {
                 let name = name.to_string_lossy();
-                name == ".prepare" || name.starts_with(PROBE)
+                name == OWN || name.starts_with(PROBE)
             };
             let names = names.collect::<std::io::Result<Vec<_>>>().map_err(list)?;
             if let Some(name) = names.into_iter().find(|name| !is_ours(name)) {
@@ -114,13 +118,19 @@ impl Store {
                 );
             }
         }
+        // what is in it may be somebody else's: it leads nowhere else
+        let images = below(root, Path::new(OWN).join("images"))?;
         create(root)?;
         writable(root, root)?;
-        if force && own.is_dir() {
-            Self::read(root, shard)?.clear()?;
+        create(&own)?;
+        let lock = own.join(LOCK);
+        let lock = if shard.is_part() { Lock::shared(&lock) } else { Lock::exclusive(&lock) };
+        let lock = lock.map_err(with_remedy)?;
+        if force {
+            plan::clear(root, &plan::read(root)?)?;
         }
-        create(&own.join("images"))?;
-        let file = own.join("settings.json");
+        create(&images)?;
+        let file = below(root, Path::new(OWN).join("settings.json"))?;
         match fs::read(&file) {
             Ok(bytes) => {
                 let old: Settings = serde_json::from_slice(&bytes)
@@ -138,11 +148,11 @@ impl Store {
             }
             Err(_) => write_json(&file, settings)?,
         }
-        Self::read(root, shard)
+        Self::read(root, shard, lock)
     }
 
-    fn read(root: &Path, shard: Shard) -> Result<Self> {
-        let own = root.join(".prepare");
+    fn read(root: &Path, shard: Shard, lock: Lock) -> Result<Self> {
+        let own = root.join(OWN);
         let mut records = BTreeMap::new();
         let mut logs: Vec<PathBuf> = fs::read_dir(&own)
             .map_err(|e| Error::io(&own, "list", e))?
@@ -154,10 +164,13 @@ impl Store {
             let text = fs::read_to_string(log).map_err(|e| Error::io(log, "read", e))?;
             // a line that a stopped run left unfinished is not a record; its file is examined again
             for record in text.lines().filter_map(|line| serde_json::from_str::<Record>(line).ok()) {
+                if let Some(facts) = record.facts() {
+                    plan::check_id(log, &facts.id)?;
+                }
                 records.insert(record.key.clone(), record);
             }
         }
-        let path = own.join(log_name(shard));
+        let path = below(root, Path::new(OWN).join(log_name(shard)))?;
         let mut log = OpenOptions::new().create(true).append(true).open(&path);
         if let Ok(file) = &mut log
             && file.metadata().is_ok_and(|m| m.len() > 0)
@@ -166,21 +179,8 @@ impl Store {
             file.write_all(b"\n").map_err(|e| Error::io(&path, "write", e))?;
         }
         let log = log.map_err(|e| Error::io(&path, "open", e))?;
-        let plan = match fs::read(own.join("plan.json")) {
-            Ok(bytes) => serde_json::from_slice(&bytes)
-                .with_context(|| format!("{}: damaged plan.json; start over with --force", own.display()))?,
-            Err(_) => BTreeMap::new(),
-        };
-        Ok(Self { root: root.to_path_buf(), records, log, log_path: path, plan })
-    }
-
-    /// Removes all that was written here, and nothing else.
-    fn clear(self) -> Result<()> {
-        for place in self.plan.values().flatten() {
-            remove(&self.root.join(place))?;
-        }
-        let own = self.root.join(".prepare");
-        Ok(fs::remove_dir_all(&own).map_err(|e| Error::io(&own, "remove", e))?)
+        let plan = plan::read(root)?;
+        Ok(Self { root: root.to_path_buf(), records, log, log_path: path, plan, _lock: lock })
     }
 
     pub(super) fn root(&self) -> &Path {
@@ -212,10 +212,10 @@ impl Store {
 
     /// Where an image waits until it is placed.
     pub(super) fn waiting(&self, id: &str) -> PathBuf {
-        self.root.join(".prepare/images").join(format!("{id}.exr"))
+        self.root.join(OWN).join("images").join(format!("{id}.exr"))
     }
 
-    /// Where an image is now.
+    /// Where an image is now. The plan's places were checked when it was read.
     pub(super) fn image(&self, id: &str) -> Option<PathBuf> {
         let places = self.plan.get(id).into_iter().flatten().map(|place| self.root.join(place));
         std::iter::once(self.waiting(id)).chain(places).find(|path| path.is_file())
@@ -224,6 +224,7 @@ impl Store {
     /// Moves every image to the place that `wanted` names (relative to the folder), and removes those of ids that it does
     /// not. Whenever it is stopped, no image is lost: the plan is on disk before anything moves.
     pub(super) fn move_images(&mut self, wanted: &BTreeMap<String, String>) -> Result<()> {
+        self.refuse_others(wanted)?;
         let mut both = self.plan.clone();
         for (id, place) in wanted {
             let places = both.entry(id.clone()).or_default();
@@ -235,30 +236,45 @@ impl Store {
         let owned: BTreeSet<PathBuf> = self.plan.keys().filter_map(|id| self.image(id)).collect();
         for (_, places) in self.plan.iter().filter(|(id, _)| self.waiting(id).is_file()) {
             for former in places.iter().map(|place| self.root.join(place)).filter(|p| !owned.contains(p)) {
-                remove(&former)?;
+                plan::remove(&former)?;
             }
         }
         // first out of the way, then into place: names may be exchanged
         for id in self.plan.keys() {
             let Some(now) = self.image(id) else { continue };
             match wanted.get(id) {
-                None => remove(&now)?,
+                None => plan::remove(&now)?,
                 Some(place) if now != self.root.join(place) => rename(&now, &self.waiting(id))?,
                 Some(_) => {}
             }
         }
         for (id, place) in wanted {
-            let (from, to) = (self.waiting(id), self.root.join(place));
+            let (from, to) = (self.waiting(id), plan::checked(&self.root, place)?);
             if from.is_file() {
                 create(to.parent().unwrap_or(&self.root))?;
-                rename(&from, &to)?;
+                name_new(&from, &to).map_err(|e| Error::io(&to, "write", e))?;
             }
         }
         self.write_plan(wanted.iter().map(|(id, place)| (id.clone(), vec![place.clone()])).collect())
     }
 
+    /// Refuses, before anything moves, places at which there is what no earlier run put there.
+    fn refuse_others(&self, wanted: &BTreeMap<String, String>) -> Result<()> {
+        let known: BTreeSet<&String> = self.plan.values().flatten().collect();
+        for place in wanted.values() {
+            let path = plan::checked(&self.root, place)?;
+            if !known.contains(place) && path.symlink_metadata().is_ok() {
+                bail!(
+                    "{}: is there already, and no earlier run wrote it; move it away, or name another folder",
+                    path.display()
+                );
+            }
+        }
+        Ok(())
+    }
+
     fn write_plan(&mut self, plan: BTreeMap<String, Vec<String>>) -> Result<()> {
-        write_json(&self.root.join(".prepare/plan.json"), &plan)?;
+        write_json(&self.root.join(OWN).join("plan.json"), &plan)?;
         self.plan = plan;
         Ok(())
     }
@@ -292,11 +308,4 @@ fn create(folder: &Path) -> Result<()> {
 
 fn rename(from: &Path, to: &Path) -> Result<()> {
     Ok(fs::rename(from, to).map_err(|e| Error::io(to, "write", e))?)
-}
-
-fn remove(path: &Path) -> Result<()> {
-    match fs::remove_file(path) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path, "remove", e).into()),
-        _ => Ok(()),
-    }
 }

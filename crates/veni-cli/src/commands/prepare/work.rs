@@ -14,7 +14,7 @@ use super::scan::Source;
 use super::store::Store;
 use crate::output::{CHOOSE_LAYER, with_remedy};
 use crate::progress::Bars;
-use crate::report::{Report, to_stderr};
+use crate::report::{Report, complain};
 
 /// The brightest value that is written without a factor, with room for rounding.
 const BRIGHTEST: f32 = 60_000.0;
@@ -43,7 +43,7 @@ pub(super) fn examine_all(
         let _claim = Budget::shared().claim_file(&source.path, &config.read);
         let fate = fate(&store, source, config, network)?;
         if let Fate::Refused(reason) = &fate {
-            to_stderr(&format!("{}: {reason}\n", source.path.display()));
+            complain(&format!("{}: {reason}", source.path.display()));
         }
         lock(&store).add(Record::new(source, fate))?;
         bars.add(1);
@@ -82,7 +82,7 @@ fn fate(
         Err(error) => return Ok(refused(error)),
     };
     for note in &examined.notes {
-        to_stderr(&format!("{}: {note}\n", source.path.display()));
+        complain(&format!("{}: {note}", source.path.display()));
     }
     let path = lock(store).waiting(&id);
     let (precision, half_range) = storage(&examined.panorama);

@@ -87,7 +87,11 @@ impl Files {
         }
         options.attributes.insert(SCENE.to_owned(), json(scene)?);
         options.attributes.insert(SIZE.to_owned(), size(panorama.grid()));
-        panorama.write(&path, &options)
+        match panorama.write(&path, &options) {
+            // another process goes on with the same set: its file is this one
+            Err(Error::Exists { .. }) if self.resume => Ok(()),
+            written => written,
+        }
     }
 }
 

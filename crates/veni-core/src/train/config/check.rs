@@ -13,6 +13,7 @@ impl TrainConfig {
     pub fn check(&self) -> Result<()> {
         self.model.validate()?;
         self.augment.check()?;
+        self.check_bounds()?;
         self.check_system()?;
         let factor = self.loss_grid.factor();
         let (w, h) = (self.data.width, self.data.height);
@@ -20,9 +21,6 @@ impl TrainConfig {
             return Err(Error::invalid(format!(
                 "loss_grid.factor = {factor} does not divide {w} × {h} pixels"
             )));
-        }
-        if self.batch == 0 {
-            return Err(Error::invalid("batch = 0: needs at least one panorama per step"));
         }
         self.check_parts()?;
         if self.decoder_backend == DecoderBackend::KernelsBfloat16 {

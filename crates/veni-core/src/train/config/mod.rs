@@ -1,5 +1,6 @@
 //! Everything that defines a training run, as stored in its `config.toml`.
 
+mod bounds;
 mod check;
 mod device;
 mod loss_grid;

@@ -4,23 +4,24 @@ use std::collections::HashSet;
 use std::fs;
 use std::io::Write;
 
+use super::folder::{FOLDERS, clear_leftovers, record_command, recorded_command, refuse_used};
 use super::*;
 use crate::train::init::{self, InitConfig};
 use veni_data::PixelStorage;
 use veni_light::limits::{MAX_SETTINGS_BYTES, read_text};
 use veni_light::model::Model;
-use veni_light::output::{Overwrite, existing_above, write_atomic};
+use veni_light::output::{Lock, Overwrite, existing_above, write_atomic};
 use veni_light::progress::{Observer, Silent};
 
 impl Trainer {
-    /// Starts a run in `folder`, which must be free ([`is_free`]). `command` is recorded in the model file.
+    /// Starts a run in `folder`, which must be free ([`is_free`](super::is_free)). `command` is recorded in the model file.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the folder is in use or the configuration does not fit; what reading the data says.
     pub fn create(folder: &Path, config: TrainConfig, command: &str) -> Result<Self> {
         refuse_used(folder)?;
-        let trainer = Self::prepare(folder, config, command, &Silent)?;
-        trainer.begin()?;
+        let mut trainer = Self::prepare(folder, config, command, &Silent)?;
+        trainer.begin(None)?;
         Ok(trainer)
     }
 
@@ -40,15 +41,26 @@ impl Trainer {
         Self::fresh(folder, config, command, init.as_ref(), 0, observer)
     }
 
-    /// Makes the run's folder: from here on it can be continued.
+    /// Makes the run's folder: from here on it can be continued. `lock` is the folder's ([`lock`](super::lock)) if the caller has it
+    /// already.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the folder is in use, [`Error::Io`] if it cannot be written to.
-    pub fn begin(&self) -> Result<()> {
+    /// [`Error::Busy`] if another process has a run in the folder; [`Error::Invalid`] if the folder is in use or a link in it
+    /// leads elsewhere; [`Error::Io`] if it cannot be written to.
+    pub fn begin(&mut self, lock: Option<Lock>) -> Result<()> {
         refuse_used(&self.folder)?;
-        for left in leftovers(&self.folder)? {
-            fs::remove_file(&left).map_err(|e| Error::io(&left, "remove", e))?;
-        }
+        let lock = match lock {
+            Some(lock) => lock,
+            None => {
+                fs::create_dir_all(&self.folder).map_err(|e| Error::io(&self.folder, "create", e))?;
+                let lock = super::lock(&self.folder)?;
+                // another process may have begun, and ended, before the lock was taken
+                refuse_used(&self.folder)?;
+                lock
+            }
+        };
+        self.lock = Some(lock);
+        clear_leftovers(&self.folder)?;
         self.make_folders()?;
         let checkpoint = self.checkpoint_path();
         if self.initialised.is_some() {
@@ -57,6 +69,7 @@ impl Trainer {
         } else if checkpoint.exists() {
             fs::remove_file(&checkpoint).map_err(|e| Error::io(&checkpoint, "remove", e))?;
         }
+        record_command(&self.folder, &self.command)?;
         // last: a folder with this file is a run
         let text = self.config.to_toml()?;
         let path = self.folder.join("config.toml");
@@ -65,10 +78,11 @@ impl Trainer {
         })
     }
 
-    /// Continues the run in `folder` from its checkpoint (or from the start, if it was ended before its first).
+    /// Continues the run in `folder` from its checkpoint (or from the start, if it was ended before its first). `command` is
+    /// recorded in the model file if the run itself does not say how it was begun.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::Invalid`] if `config.toml` or the checkpoint cannot be read or do not fit together.
+    /// [`Error::Busy`] if another process has it; [`Error::Io`] or [`Error::Invalid`] if `config.toml` or the checkpoint cannot be read or do not fit together.
     pub fn resume(folder: &Path, command: &str) -> Result<Self> {
         Self::resume_with(folder, command, &PixelStorage::default(), &Silent)
     }
@@ -87,9 +101,10 @@ impl Trainer {
         let path = folder.join("config.toml");
         let text = read_text(&path, "a configuration", MAX_SETTINGS_BYTES)?;
         let config = TrainConfig::from_toml(&text).map_err(|e| e.in_file(&path))?.with_pixel_storage(storage);
-        for left in leftovers(folder)? {
-            fs::remove_file(&left).map_err(|e| Error::io(&left, "remove", e))?;
-        }
+        let lock = super::lock(folder)?;
+        clear_leftovers(folder)?;
+        let begun = recorded_command(folder)?;
+        let command = begun.as_deref().unwrap_or(command);
         let path = checkpoint_path(folder);
         let state = if path.exists() { Some(checkpoint::load(&path)?) } else { None };
         if let (None, Some(init)) = (&state, &config.init) {
@@ -101,6 +116,7 @@ impl Trainer {
         }
         let done = state.as_ref().map_or(0, |(_, info)| info.step);
         let mut trainer = Self::fresh(folder, config, command, None, done, observer)?;
+        trainer.lock = Some(lock);
         trainer.make_folders()?;
         if let Some((state, info)) = state {
             trainer.optimiser.restore(state, info.step).map_err(|e| e.in_file(&path))?;
@@ -140,7 +156,18 @@ impl Trainer {
         let optimiser = Optimiser::new(&network, groups(&config), config.ema_decay)?;
         let replicas = Replicas::new(network, &config, &devices)?;
         let (folder, command, best) = (folder.to_path_buf(), command.to_owned(), None);
-        Ok(Self { folder, config, splits, stages, command, replicas, optimiser, best, initialised })
+        Ok(Self {
+            folder,
+            lock: None,
+            config,
+            splits,
+            stages,
+            command,
+            replicas,
+            optimiser,
+            best,
+            initialised,
+        })
     }
 
     fn make_folders(&self) -> Result<()> {
@@ -151,17 +178,6 @@ impl Trainer {
         Ok(())
     }
 }
-
-fn refuse_used(folder: &Path) -> Result<()> {
-    if is_free(folder)? {
-        return Ok(());
-    }
-    let folder = folder.display();
-    Err(Error::invalid(format!("{folder}: is not empty; continue the run in it, or name a new folder")))
-}
-
-/// Folders inside a run's.
-const FOLDERS: [&str; 2] = ["checkpoint", "preview"];
 
 /// The training panoramas of a stage, without those that validate the run.
 fn own_data(stage: &Stage, val: &Dataset, scratch: &Path, observer: &dyn Observer) -> Result<Dataset> {
@@ -176,55 +192,4 @@ fn own_data(stage: &Stage, val: &Dataset, scratch: &Path, observer: &dyn Observe
         return Err(named(Error::invalid("all of its panoramas are the run's validation panoramas")));
     }
     Ok(kept)
-}
-
-/// Whether a run may begin in `folder`: it does not exist, is empty, or holds nothing but what a run leaves that was
-/// ended while it began.
-///
-/// # Errors
-/// [`Error::Io`] if a folder cannot be listed, or a checkpoint not read.
-pub fn is_free(folder: &Path) -> Result<bool> {
-    if !folder.exists() {
-        return Ok(true);
-    }
-    let left = leftovers(folder)?;
-    let entries = |folder: &Path| -> Result<Vec<PathBuf>> {
-        let list = |e| Error::io(folder, "list", e);
-        let entries = fs::read_dir(folder).map_err(list)?;
-        let paths = entries.map(|entry| entry.map(|e| e.path()).map_err(list)).collect::<Result<Vec<_>>>()?;
-        Ok(paths.into_iter().filter(|path| !left.contains(path)).collect())
-    };
-    let inner = FOLDERS.map(|name| folder.join(name));
-    for path in entries(folder)? {
-        if !inner.contains(&path) || !path.is_dir() {
-            return Ok(false);
-        }
-        for file in entries(&path)? {
-            // weights that a run was to begin with
-            if file != checkpoint_path(folder) || checkpoint::load(&file)?.1.step > 0 {
-                return Ok(false);
-            }
-        }
-    }
-    Ok(true)
-}
-
-/// Half-written files in a run's folder, which a process left that was killed while it wrote them.
-///
-/// # Errors
-/// [`Error::Io`] if a folder cannot be listed.
-pub fn leftovers(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut found = Vec::new();
-    for folder in std::iter::once(folder.to_path_buf()).chain(FOLDERS.map(|inner| folder.join(inner))) {
-        if !folder.is_dir() {
-            continue;
-        }
-        for entry in fs::read_dir(&folder).map_err(|e| Error::io(&folder, "list", e))? {
-            let path = entry.map_err(|e| Error::io(&folder, "list", e))?.path();
-            if veni_light::output::is_part(&path) {
-                found.push(path);
-            }
-        }
-    }
-    Ok(found)
 }

@@ -40,7 +40,13 @@ impl Trainer {
         Ok(weights::write(self.network().clone(), "", &weights)?.valid())
     }
 
-    pub(super) fn validate(&mut self, log: &mut MetricsLog, progress: &mut dyn Progress) -> Result<()> {
+    /// [`Error::Cancelled`], with nothing changed, if `stop` is raised meanwhile.
+    pub(super) fn validate(
+        &mut self,
+        stop: &AtomicBool,
+        log: &mut MetricsLog,
+        progress: &mut dyn Progress,
+    ) -> Result<()> {
         let network = self.averaged()?;
         let subset = |set: &Dataset, most: usize| match set.items().get(..most) {
             Some(first) => Dataset::new(set.grid(), first.to_vec()),
@@ -51,7 +57,7 @@ impl Trainer {
             None => self.splits.val.clone(),
         };
         let mean = |set: &Dataset, known: bool| -> Result<_> {
-            let decode = |range| self.reconstructed(&network, set, range, known);
+            let decode = |range| self.reconstructed(&network, set, range, known, stop);
             let scores = Reconstruction::by_parts(set, Alignment::LogFactor, decode)?.mean;
             Ok((!set.is_empty()).then_some(scores))
         };
@@ -64,8 +70,8 @@ impl Trainer {
             _ => true,
         };
         if best {
+            self.store(&network, 0, step, stop, progress)?;
             self.best = val.map(|scores| Best { step, ldr_psnr: scores.ldr_psnr });
-            self.store(&network, 0, step, progress)?;
         }
         let report = ValidationReport { step, val, train, best };
         log.append(&Record { step, validation: &report })?;
@@ -81,7 +87,9 @@ impl Trainer {
         set: &Dataset,
         range: Range<usize>,
         known: bool,
+        stop: &AtomicBool,
     ) -> Result<Vec<Vec<f32>>> {
+        go_on(stop)?;
         let (grid, images) = (set.grid(), views(&set.items()[range.clone()]));
         let latents = match (network, &self.config.latents) {
             (Network::Veni(veni), _) => {
@@ -91,7 +99,7 @@ impl Trainer {
                 let rows = table_rows(&reni.latents).into_iter();
                 rows.skip(range.start).take(range.len()).map(|row| row.latent).collect()
             }
-            (Network::Reni(reni), Some(config)) => fitted(&reni.decoder, grid, &images, config)?,
+            (Network::Reni(reni), Some(config)) => fitted(&reni.decoder, grid, &images, config, stop)?,
             (Network::Reni(_), None) => unreachable!("checked with the configuration"),
         };
         let vectors: Vec<_> = latents.iter().map(|z| z.vectors.clone()).collect();
@@ -104,8 +112,15 @@ impl Trainer {
 
     /// Writes `model.safetensors`; the prior is fitted to the training panoramas and `copies` augmented copies. With
     /// an auto-decoder also `latents.safetensors`.
-    fn store(&self, network: &Network, copies: usize, step: u64, progress: &mut dyn Progress) -> Result<()> {
-        let (prior, latents) = self.prior(network, copies)?;
+    fn store(
+        &self,
+        network: &Network,
+        copies: usize,
+        step: u64,
+        stop: &AtomicBool,
+        progress: &mut dyn Progress,
+    ) -> Result<()> {
+        let (prior, latents) = self.prior(network, copies, stop)?;
         let info = ModelInfo {
             training: Some(Training {
                 data: self.describe_data(),
@@ -163,9 +178,9 @@ impl Trainer {
     }
 
     /// The prior of the training panoramas, and the number of latents that it was fitted to.
-    fn prior(&self, network: &Network, copies: usize) -> Result<(Prior, usize)> {
+    fn prior(&self, network: &Network, copies: usize, stop: &AtomicBool) -> Result<(Prior, usize)> {
         let (codes, variances) = match network {
-            Network::Veni(veni) => self.encoded(veni, copies)?,
+            Network::Veni(veni) => self.encoded(veni, copies, stop)?,
             Network::Reni(reni) => {
                 let rows = table_rows(&reni.latents).into_iter().zip(self.splits.train.items());
                 rows.map(|(row, item)| {
@@ -185,7 +200,7 @@ impl Trainer {
     /// Latents and variances of the training panoramas and `copies` augmented copies of each; of a large set of
     /// [`PRIOR_PANORAMAS`], evenly spread. Generated scenes count only where there is nothing else: a random sky must
     /// be like the photographed ones.
-    fn encoded(&self, veni: &Veni, copies: usize) -> Result<(Vec<Latent>, Vec<Vec<f32>>)> {
+    fn encoded(&self, veni: &Veni, copies: usize, stop: &AtomicBool) -> Result<(Vec<Latent>, Vec<Vec<f32>>)> {
         let train = &self.splits.train;
         let batches = Batches::new(&self.config, veni.stripes()?, train);
         let photographed = train.items().iter().filter(|item| !item.generated).count();
@@ -197,6 +212,7 @@ impl Trainer {
         let (mut codes, mut variances) = (Vec::new(), Vec::new());
         for copy in 0..=copies {
             for chosen in chosen.chunks(CHUNK) {
+                go_on(stop)?;
                 let image = |i: usize| match copy {
                     0 => Cow::Borrowed(train.items()[i].log_radiance.fetched()),
                     // slots beyond any batch: copies that no update has seen
@@ -214,10 +230,9 @@ impl Trainer {
         Ok((codes, variances))
     }
 
-    pub(super) fn preview(&self, progress: &mut dyn Progress) -> Result<()> {
+    pub(super) fn preview(&self, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<()> {
         let network = self.averaged()?;
-        let step = self.steps_done();
-        let (prior, _) = self.prior(&network, 0)?;
+        let (prior, _) = self.prior(&network, 0, stop)?;
         let (val, train) = (self.splits.val.items(), self.splits.train.items());
         // validation panoramas first: they say more; an auto-decoder has latents of the others only
         let known = matches!(network, Network::Reni(_));
@@ -226,21 +241,26 @@ impl Trainer {
         let set = Dataset::new(self.splits.train.grid(), items);
         let mut rng = stream(self.config.seed, Purpose::Preview, 0, 0);
         let samples: Vec<_> = set.items().iter().map(|_| Latent::sample(&prior, &mut rng).vectors).collect();
-        let decoded = self.reconstructed(&network, &set, 0..set.len(), known)?;
+        let decoded = self.reconstructed(&network, &set, 0..set.len(), known, stop)?;
         let samples = decode(network.decoder(), set.grid(), &samples);
         let rows: Vec<_> = (set.items().iter().zip(decoded.into_iter().zip(samples)))
             .map(|(item, (reconstruction, sample))| vec![item.log_radiance.to_vec(), reconstruction, sample])
             .collect();
-        let path = self.folder.join("preview").join(format!("step-{step:06}.png"));
+        let path = self.preview_path();
         preview::write(&path, set.grid(), &rows)?;
         progress.wrote(&path);
         Ok(())
     }
 
     /// The last validation and preview, then the best model again with the full prior.
-    pub(super) fn finish(&mut self, log: &mut MetricsLog, progress: &mut dyn Progress) -> Result<()> {
-        self.validate(log, progress)?;
-        self.preview(progress)?;
+    pub(super) fn finish(
+        &mut self,
+        stop: &AtomicBool,
+        log: &mut MetricsLog,
+        progress: &mut dyn Progress,
+    ) -> Result<()> {
+        self.validate(stop, log, progress)?;
+        self.preview(stop, progress)?;
         if let Network::Reni(_) = self.network() {
             // its prior has no copies to wait for
             return Ok(());
@@ -250,8 +270,13 @@ impl Trainer {
         let step = model.info().training.as_ref().map_or(self.steps_done(), |t| t.steps);
         // from here on the file is complete, and stays: the stored weights, not the last ones
         let veni = Veni::from_model(&model, &self.config.device.device()?)?;
-        self.store(&Network::Veni(veni), self.config.report.prior_copies, step, progress)
+        self.store(&Network::Veni(veni), self.config.report.prior_copies, step, stop, progress)
     }
+}
+
+/// [`Error::Cancelled`] once `stop` is raised.
+fn go_on(stop: &AtomicBool) -> Result<()> {
+    if stop.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
 }
 
 fn views(items: &[veni_data::Item]) -> Vec<&[f32]> {
@@ -264,6 +289,7 @@ fn fitted(
     grid: Equirect,
     images: &[&[f32]],
     config: &LatentsConfig,
+    stop: &AtomicBool,
 ) -> Result<Vec<Latent>> {
     let (factor, n) = (config.validation_factor, decoder.latent_vectors());
     let coarse: Vec<_> = images.iter().map(|image| averaged(grid, image, factor)).collect();
@@ -271,6 +297,7 @@ fn fitted(
     let mut latents = Vec::with_capacity(images.len());
     // a few at a time: the graph of a fit holds every activation of its images
     for images in coarse.chunks(4) {
+        go_on(stop)?;
         let target = FitTarget::panoramas(coarse_grid(grid, factor), images)?;
         let start = vec![Latent::new(vec![[0.0; 3]; n]); images.len()];
         latents.extend(fit(decoder, &target, &start, &config.validation)?.latents);

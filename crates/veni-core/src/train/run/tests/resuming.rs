@@ -33,6 +33,9 @@ fn continues_to_the_bit(config: TrainConfig, more: &[&str]) {
     let mut trainer = Trainer::create(&stopped, config.clone(), "test").unwrap();
     let finish = trainer.run(&stop, &mut After { step: 3, stop: &stop, panic: false }).unwrap();
     assert_eq!((finish, trainer.steps_done()), (Finish::Stopped, 3));
+    let message = Trainer::resume(&stopped, "test").unwrap_err().to_string();
+    assert!(message.contains("at work here"), "a run has one trainer at a time: {message}");
+    drop(trainer);
     let mut trainer = Trainer::resume(&stopped, "test").unwrap();
     assert_eq!(trainer.steps_done(), 3);
     complete(&mut trainer);
@@ -41,6 +44,7 @@ fn continues_to_the_bit(config: TrainConfig, more: &[&str]) {
     let mut progress = After { step: 3, stop: &stop, panic: true };
     let run = catch_unwind(AssertUnwindSafe(|| trainer.run(&AtomicBool::new(false), &mut progress)));
     assert!(run.is_err());
+    drop(trainer);
     let mut trainer = Trainer::resume(&killed, "test").unwrap();
     assert_eq!(trainer.steps_done(), 2, "the last checkpoint");
     complete(&mut trainer);
@@ -58,6 +62,28 @@ fn continues_to_the_bit(config: TrainConfig, more: &[&str]) {
     let path = folder.path().join("seed");
     complete(&mut Trainer::create(&path, config, "test").unwrap());
     assert_ne!(file(&whole, "checkpoint/state.safetensors"), file(&path, "checkpoint/state.safetensors"));
+}
+
+/// A stop that comes when a validation is due does not wait for it: the validation is made when the run goes on.
+#[test]
+fn a_validation_that_was_stopped_is_made_later() {
+    let (folder, mut config) = setup(4);
+    config.report.validate_every = 2;
+    config.report.preview_every = 2;
+    let [whole, stopped] = ["whole", "stopped"].map(|name| folder.path().join(name));
+    complete(&mut Trainer::create(&whole, config.clone(), "test").unwrap());
+    let stop = AtomicBool::new(false);
+    let mut trainer = Trainer::create(&stopped, config, "test").unwrap();
+    let finish = trainer.run(&stop, &mut After { step: 2, stop: &stop, panic: false }).unwrap();
+    assert_eq!((finish, trainer.steps_done()), (Finish::Stopped, 2));
+    assert_eq!(losses(&stopped).len(), 2, "two updates and no validation");
+    assert!(!stopped.join("model.safetensors").exists() && !stopped.join("preview/step-000002.png").exists());
+    drop(trainer);
+    complete(&mut Trainer::resume(&stopped, "test").unwrap());
+    assert_eq!(losses(&whole), losses(&stopped));
+    for name in ["checkpoint/state.safetensors", "model.safetensors", "preview/step-000002.png"] {
+        assert!(file(&whole, name) == file(&stopped, name), "{name} differs");
+    }
 }
 
 #[test]

@@ -1,0 +1,161 @@
+//! Wavefront OBJ files: all objects of one as a mesh in the native frame.
+
+use std::path::Path;
+
+use anyhow::{Result, anyhow, bail};
+use clap::ValueEnum;
+use veni_fit::shade::Mesh;
+use veni_light::limits::{at_most, read_file};
+use veni_light::text;
+
+/// Bytes of an OBJ file: the largest scans have a few hundred MB.
+const MAX_OBJ_BYTES: u64 = 1 << 30;
+/// Corners of its faces, each of which takes some 100 bytes in memory and two in the file: a scan of 11 million triangles.
+const MAX_OBJ_CORNERS: u64 = 1 << 25;
+/// A mesh whose centre is farther away than this many times its size loses digits in single precision that are seen
+/// (2⁻²⁴ of the distance): it is moved to the origin first.
+const FAR: f64 = 16.0;
+
+/// Which axis of a mesh points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Up {
+    /// As most OBJ files have it
+    #[default]
+    Y,
+    /// As in this program
+    Z,
+}
+
+/// A mesh, and the point of the file's coordinates that is its origin.
+pub(super) struct Placed {
+    pub(super) mesh: Mesh,
+    pub(super) origin: [f64; 3],
+}
+
+/// Reads a file; every triangle has three vertices of its own.
+pub(super) fn read(path: &Path, up: Up) -> Result<Placed> {
+    let bytes = read_file(path, "a Wavefront OBJ file that is read", MAX_OBJ_BYTES)?;
+    let text = text::decode(bytes)
+        .map_err(|_| anyhow!("{}: is not text: a Wavefront OBJ file is", path.display()))?;
+    let text = statements(&text);
+    let [with, without] = corners(&text);
+    at_most("corners of faces", (with + without) as u64, MAX_OBJ_CORNERS).map_err(|e| e.in_file(path))?;
+    if with > 0 && without > 0 {
+        bail!(
+            "{}: {without} of {} corners of faces lack normals: give all of them one, or none",
+            path.display(),
+            with + without
+        );
+    }
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
+    // materials are not used, and a library may be anywhere: it is not opened
+    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials)
+        .map_err(|e| anyhow!("{}: {}", path.display(), explain(e)))?;
+    let native = |v: &[f64]| match up {
+        // Frame::Gltf in double precision
+        Up::Y => [v[0], -v[2], v[1]],
+        Up::Z => [v[0], v[1], v[2]],
+    };
+    let (mut positions, mut normals) = (Vec::new(), Vec::new());
+    for tobj::Model { mesh, .. } in &models {
+        positions.extend(mesh.indices.iter().map(|at| native(&mesh.positions[3 * *at as usize..])));
+        if with > 0 {
+            let normal = |at: &u32| native(&mesh.normals[3 * *at as usize..]).map(|c| c as f32);
+            normals.extend(mesh.normal_indices.iter().map(normal));
+        }
+    }
+    let count = u32::try_from(positions.len())
+        .map_err(|_| anyhow!("{}: more than {} corners of triangles", path.display(), u32::MAX))?;
+    let triangles = (0..count / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let origin = far_centre(&positions);
+    let moved = |[x, y, z]: [f64; 3]| [x - origin[0], y - origin[1], z - origin[2]].map(|c| c as f32);
+    let positions = positions.into_iter().map(moved).collect();
+    Ok(Placed { mesh: Mesh { positions, normals: (with > 0).then_some(normals), triangles }, origin })
+}
+
+/// The middle of the points where it is far from the origin; else the origin.
+fn far_centre(points: &[[f64; 3]]) -> [f64; 3] {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for point in points {
+        for c in 0..3 {
+            (low[c], high[c]) = (low[c].min(point[c]), high[c].max(point[c]));
+        }
+    }
+    let centre: [f64; 3] = std::array::from_fn(|c| 0.5 * (low[c] + high[c]));
+    let length = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let size = length(std::array::from_fn(|c| high[c] - low[c]));
+    let is_far = length(centre) > FAR * size && centre.iter().all(|c| c.is_finite());
+    if is_far { centre } else { [0.0; 3] }
+}
+
+/// One statement per line: without comments, and continued lines in one.
+fn statements(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for line in text.lines() {
+        let line = line.split('#').next().unwrap_or_default().trim_end();
+        match line.strip_suffix('\\') {
+            Some(begun) => out.extend([begun, " "]),
+            None => out.extend([line, "\n"]),
+        }
+    }
+    out
+}
+
+/// How many corners of faces name a normal, and how many do not. The reader would make one up for those.
+fn corners(statements: &str) -> [usize; 2] {
+    let mut counts = [0; 2];
+    let words = statements.lines().map(str::split_whitespace);
+    let faces = words.filter_map(|mut words| (words.next() == Some("f")).then_some(words));
+    for corner in faces.flatten() {
+        let named = corner.split('/').nth(2).is_some_and(|n| !n.is_empty());
+        counts[usize::from(!named)] += 1;
+    }
+    counts
+}
+
+/// What is wrong with the file.
+fn explain(error: tobj::LoadError) -> String {
+    use tobj::LoadError as E;
+    let what = match error {
+        E::FaceVertexOutOfBounds => "a face names a vertex that is not in the file",
+        E::FaceNormalOutOfBounds => "a face names a normal that is not in the file",
+        E::FaceTexCoordOutOfBounds => "a face names a texture coordinate that is not in the file",
+        E::PositionParseError => "a vertex is not three numbers",
+        E::NormalParseError => "a normal is not three numbers",
+        E::FaceParseError | E::InvalidPolygon => "a face is not a list of at least three vertices",
+        other => return format!("no readable Wavefront OBJ file: {other}"),
+    };
+    what.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use veni_light::sphere::Frame;
+
+    #[test]
+    fn statements_are_whole_and_without_comments() {
+        let text = "# head\nv 1 2 \\\n3 # up\r\nf 1 2 3# side\nv 4 5 6";
+        assert_eq!(statements(text), "\nv 1 2  3\nf 1 2 3\nv 4 5 6\n");
+        assert_eq!(corners(&statements("f 1//1 2//1 \\\n 3//1 # f 4 5 6\nf 1 2/3 3/4/5")), [4, 2]);
+    }
+
+    #[test]
+    fn double_precision_turns_as_single_precision_does() {
+        let path = tempfile::tempdir().unwrap();
+        let path = path.path().join("a.obj");
+        std::fs::write(&path, "v 1 2 3\nv 4 5 6\nv 7 8 10\nf 1 2 3\n").unwrap();
+        let Placed { mesh, origin } = read(&path, Up::Y).unwrap();
+        assert_eq!((mesh.positions[0], origin), (Frame::Gltf.to_native([1.0, 2.0, 3.0]), [0.0; 3]));
+        std::fs::write(&path, "v 5e6 4e6 100.25\nv 5000001 4e6 100.5\nv 5e6 4000001 100\nf 1 2 3\n").unwrap();
+        let Placed { mesh, origin } = read(&path, Up::Z).unwrap();
+        assert_eq!(origin, [5_000_000.5, 4_000_000.5, 100.25]);
+        assert_eq!(mesh.positions[1], [0.5, -0.5, 0.25]);
+    }
+}

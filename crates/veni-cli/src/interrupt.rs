@@ -1,0 +1,107 @@
+//! Ctrl-C and requests to terminate: whatever runs ends at once and leaves no half-written file, unless it asked to be told.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use veni_light::output::abandon;
+
+use crate::report::complain;
+
+/// What is told of the first signal instead of ending, and what is said then.
+static TOLD: Mutex<Option<Told>> = Mutex::new(None);
+
+struct Told {
+    flag: &'static AtomicBool,
+    said: &'static str,
+}
+
+/// Watches from now on. Where that is not possible the system's own way of ending a process stays.
+pub(crate) fn watch() {
+    if let Err(error) = system::watch() {
+        complain(&format!("cannot watch for Ctrl-C ({error}): a file being written then stays half-written"));
+    }
+}
+
+/// From now on the first signal raises the flag and says `said`; the second one ends the process.
+#[cfg(feature = "learn")]
+pub(crate) fn tell(said: &'static str) -> &'static AtomicBool {
+    let flag: &AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
+    *TOLD.lock().unwrap_or_else(PoisonError::into_inner) = Some(Told { flag, said });
+    flag
+}
+
+/// A signal came. Whether the process is to go on.
+fn goes_on() -> bool {
+    let told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
+    match &*told {
+        Some(Told { flag, said }) if !flag.swap(true, Ordering::Relaxed) => {
+            complain(said);
+            true
+        }
+        _ => false,
+    }
+}
+
+#[cfg(unix)]
+mod system {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+    use signal_hook::low_level::emulate_default_handler;
+
+    use super::{abandon, goes_on};
+
+    pub(super) fn watch() -> std::io::Result<()> {
+        let ignored = ignored();
+        let watched = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| !is_in(ignored, *signal));
+        let mut signals = Signals::new(watched)?;
+        std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+            for signal in signals.forever() {
+                if !goes_on() {
+                    let _written = abandon();
+                    // so that a shell, too, sees which signal it was
+                    let _ = emulate_default_handler(signal);
+                }
+            }
+        })?;
+        Ok(())
+    }
+
+    fn is_in(set: u64, signal: i32) -> bool {
+        u32::try_from(signal - 1).is_ok_and(|bit| set.checked_shr(bit).is_some_and(|set| set & 1 == 1))
+    }
+
+    /// The signals that whoever started the process (nohup, a shell's background) does not want it to hear. Only Linux
+    /// tells without a signal's handler being replaced.
+    fn ignored() -> u64 {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+    }
+
+    #[cfg(test)]
+    mod tests {
+        use super::*;
+
+        #[test]
+        fn signals_are_bits_from_one() {
+            assert!(is_in(0b1, 1) && !is_in(0b1, 2) && is_in(1 << 14, SIGTERM) && !is_in(u64::MAX, 0));
+            // the standard library ignores it in every program
+            #[cfg(target_os = "linux")]
+            assert!(is_in(ignored(), signal_hook::consts::SIGPIPE));
+        }
+    }
+}
+
+#[cfg(not(unix))]
+mod system {
+    use super::{abandon, goes_on};
+
+    pub(super) fn watch() -> Result<(), ctrlc::Error> {
+        ctrlc::set_handler(|| {
+            if !goes_on() {
+                let _written = abandon();
+                std::process::exit(130);
+            }
+        })
+    }
+}
