@@ -93,7 +93,12 @@ fn truncated_files() {
 fn low_dynamic_range_images_name_the_command_that_expands_them() {
     let dir = Dir::new();
     image::RgbImage::from_pixel(8, 4, image::Rgb([90, 120, 200])).save(dir.path("sky.png")).unwrap();
-    refused_everywhere(&dir, "sky.png", &["PNG", "prepare"]);
+    let words = ["sky.png", "PNG", "prepare"];
+    dir.refused(&["bake", "sky.png", "--model", model(), "-o", "out.exr", "-q"], &words);
+    dir.refused(&["encode", "sky.png", "--model", model(), "-o", "out.json", "-q"], &words);
+    dir.refused(&train_args("sky.png", "run", "1"), &words);
+    // which is said of the picture all the same
+    assert!(dir.ok(&["inspect", "sky.png"]).contains("a display's range"));
 }
 
 #[test]

@@ -55,8 +55,8 @@ fn reconstruction_prints_a_table_and_keeps_its_results() {
     let [table] = &dir.json(&args("reconstruction", &data, &[]))[..] else { panic!("one table") };
     assert_eq!(kept(&dir), results, "nothing was computed again");
     let psnr = |pass| row(table, pass)["LDR PSNR (exp.)"].as_f64().unwrap();
-    // a panorama whose optimised latent shows it worse keeps the encoder's
-    assert!(psnr("autoencoder").is_finite() && psnr("optimised") >= psnr("autoencoder"), "{table}");
+    assert!(psnr("autoencoder").is_finite() && psnr("optimised").is_finite(), "{table}");
+    assert_ne!(psnr("optimised"), psnr("autoencoder"), "{table}");
     assert_eq!(row(table, "optimised")["D"], 12.0);
     // every file and every number of a rerun elsewhere is the same
     let other = Dir::new();

@@ -10,6 +10,8 @@ mod bake;
 #[cfg(feature = "learn")]
 mod crashes;
 #[cfg(feature = "pretrained")]
+mod dark_end;
+#[cfg(feature = "pretrained")]
 mod embedded;
 #[cfg(feature = "learn")]
 mod encode;
@@ -22,20 +24,26 @@ mod fit;
 mod folds;
 #[cfg(all(feature = "learn", feature = "gpu"))]
 mod gpu;
+mod ibl;
 #[cfg(feature = "learn")]
 mod inspect;
 #[cfg(feature = "learn")]
 mod large_sets;
 #[cfg(feature = "pretrained")]
 mod light;
+mod limits;
 #[cfg(feature = "onnx")]
 #[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-data's tests use the rest of it")]
 mod onnx_file;
+#[cfg(feature = "pretrained")]
+mod pictures;
 #[cfg(feature = "learn")]
 mod prepare;
-#[cfg(feature = "learn")]
+#[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without the learning world"))]
 mod readers;
+#[cfg(feature = "pretrained-large")]
+mod remembered;
 #[cfg(feature = "learn")]
 mod render_probe;
 #[cfg(feature = "learn")]
@@ -48,3 +56,5 @@ mod train_devices;
 mod training;
 #[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without the learning world"))]
 mod util;
+#[cfg(feature = "pretrained")]
+mod writers;

@@ -116,7 +116,19 @@ pub(crate) fn exr(path: &Path) -> Image {
         }
     }
     assert!(bytes.0.is_empty(), "nothing after the last block");
-    Image { width, height, pixels, attributes }
+    Image { width, height, pixels, attributes: whole(attributes) }
+}
+
+/// Long texts are stored as `NAME[1/2]`, `NAME[2/2]`.
+fn whole(attributes: BTreeMap<String, String>) -> BTreeMap<String, String> {
+    let mut whole: BTreeMap<String, String> = BTreeMap::new();
+    // in the order of their names, so the parts of one text are in order too
+    for (name, value) in attributes {
+        assert!(value.len() <= 255, "{name} is longer than other software reads");
+        let name = name.split_once('[').map_or(name.as_str(), |(name, _)| name);
+        whole.entry(name.to_owned()).or_default().push_str(&value);
+    }
+    whole
 }
 
 /// OpenEXR's ZIP: deflate, undo the predictor, undo the split into even and odd bytes.
@@ -146,7 +158,8 @@ pub(crate) fn hdr(path: &Path) -> Image {
     let end = file.windows(2).position(|w| w == b"\n\n").expect("end of header") + 2;
     let header = std::str::from_utf8(&file[..end]).unwrap();
     assert!(header.starts_with("#?RADIANCE\n"), "{header}");
-    assert!(header.contains("FORMAT=32-bit_rle_rgbe\n"), "{header}");
+    assert_eq!(header.lines().nth(1), Some("FORMAT=32-bit_rle_rgbe"), "{header}");
+    assert!(header.lines().all(|line| line.len() < 100), "{header}");
     let line_end = end + file[end..].iter().position(|b| *b == b'\n').unwrap();
     let line: Vec<_> = std::str::from_utf8(&file[end..line_end]).unwrap().split(' ').collect();
     let ["-Y", height, "+X", width] = line[..] else { panic!("resolution line {line:?}") };

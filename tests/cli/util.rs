@@ -118,6 +118,11 @@ pub(crate) fn panorama() -> String {
     text(&files[0])
 }
 
+/// A small file of `tests/cli/files`.
+pub(crate) fn file(name: &str) -> String {
+    text(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/cli/files").join(name))
+}
+
 pub(crate) fn text(path: &Path) -> String {
     path.to_str().unwrap().to_owned()
 }

@@ -189,6 +189,12 @@ impl Case {
         }
     }
 
+    /// Whether [`compare`](Self::compare) would pass; nothing is recorded.
+    pub(crate) fn agrees(&self, name: &str, ours: &Data) -> bool {
+        let tolerance = self.tolerances.get(name).copied().unwrap_or(Tolerance::UNKNOWN);
+        compare::check(ours, self.data(name), tolerance).is_ok()
+    }
+
     /// [`compare`](Self::compare) for one number.
     pub(crate) fn compare_scalar(&self, name: &str, ours: f64) {
         self.compare(name, &Data::scalar(ours as f32));
@@ -202,6 +208,16 @@ impl Case {
     /// Whether the file says how far f32 may be off.
     pub(crate) fn has_tolerances(&self) -> bool {
         !self.tolerances.is_empty()
+    }
+
+    /// Takes a tensor as compared: the process that computes in the other precision does it.
+    pub(crate) fn leave_to_the_other_process(&self, name: &str) {
+        self.compared.borrow_mut().insert(name.to_owned());
+    }
+
+    /// What was compared and failed.
+    pub(crate) fn mismatches(&self) -> Vec<String> {
+        self.failures.borrow().clone()
     }
 
     /// How many tensors were compared.

@@ -12,14 +12,15 @@ use burn::tensor::Device;
 /// So many draws of last bits.
 const DRAWS: u64 = 12;
 
-/// The case with every weight of the network at itself or one of its two neighbours in f32.
-fn with_other_last_bits(case: &Case, seed: u64) -> Case {
+/// The case with every weight of the network at itself or the value `units` in the last place above or below it.
+pub(crate) fn with_other_last_bits(case: &Case, seed: u64, units: u32) -> Case {
     let mut case = case.clone_without_results();
     let mut state = seed;
     let network = case.tensors.iter_mut().filter(|(name, _)| name.starts_with("param.network"));
     for value in network.flat_map(|(_, data)| &mut data.values) {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        *value = [value.next_up(), value.next_down(), *value][(state >> 33) as usize % 3];
+        let step = [f32::next_up, f32::next_down, |v| v][(state >> 33) as usize % 3];
+        *value = (0..units).fold(*value, |v, _| step(v));
     }
     case
 }
@@ -31,26 +32,28 @@ fn largest(a: &[f32], b: &[f32]) -> f64 {
 #[test]
 fn the_allowance_for_fits_is_what_last_bits_cost() {
     let device = Device::flex().autodiff();
-    for name in ["c09_renipp_eval_fit_noscale", "c09_renipp_eval_fit_scale"] {
-        let path = crate::folder().join(format!("{name}.safetensors"));
-        if !path.is_file() {
+    let (mut most_moved, mut allowed) = (0f64, 0f64);
+    for path in crate::report::case_files(&crate::folder()) {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        if !name.starts_with("c09_renipp_eval_fit") {
             continue;
         }
         let case = Case::load(&path).unwrap_or_else(|e| panic!("{e}"));
         let plain = crate::fit::coordinates(&evaluate(&case, &device));
         let moved = |seed| {
-            let other = with_other_last_bits(&case, seed);
+            let other = with_other_last_bits(&case, seed, 1);
             largest(&plain, &crate::fit::coordinates(&evaluate(&other, &device)))
         };
         let moved = (1..=DRAWS).map(moved).fold(0.0, f64::max);
         let off = largest(&plain, &case.data("out.eval_mu20").values);
-        let allowed = allowance(&case);
+        allowed = allowed.max(allowance(&case));
+        most_moved = most_moved.max(moved);
         let numbers = format!(
             "{name}: other last bits of the weights move a coordinate by up to {moved:.1e}, the authors' numbers lie \
              {off:.1e} away; allowed: {allowed:.1e}"
         );
         eprintln!("{numbers}");
         assert!(off < 2.0 * moved, "{numbers}");
-        assert!(allowed < 8.0 * moved, "{numbers}");
     }
+    assert!(allowed < 2.0 * most_moved, "{allowed:.1e} is allowed, last bits cost {most_moved:.1e}");
 }

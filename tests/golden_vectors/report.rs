@@ -19,6 +19,20 @@ pub(crate) enum Verdict {
     Failed(Vec<String>),
 }
 
+impl Verdict {
+    /// With what this process compared besides.
+    fn and(self, case: &Case) -> Self {
+        match self {
+            Self::Passed(ratios) if case.mismatches().is_empty() => {
+                Self::Passed(ratios.into_iter().chain(case.ratios()).collect())
+            }
+            Self::Passed(_) => Self::Failed(case.mismatches()),
+            Self::Failed(failures) => Self::Failed(failures.into_iter().chain(case.mismatches()).collect()),
+            Self::Skipped(reason) => Self::Skipped(reason),
+        }
+    }
+}
+
 /// Computes one case. A panic inside is a failure of that case only.
 pub(crate) fn run_case(case: &Case, device: &Device) -> Verdict {
     let result = catch_unwind(AssertUnwindSafe(|| FAMILIES.iter().find_map(|family| family(case, device))));
@@ -26,7 +40,7 @@ pub(crate) fn run_case(case: &Case, device: &Device) -> Verdict {
         // a kind that nobody knows would be a case that nobody runs
         Ok(None) => Verdict::Failed(vec![format!("no module for {:?}", case.module())]),
         Ok(Some(Outcome::Skipped(reason))) => Verdict::Skipped(reason),
-        Ok(Some(Outcome::Elsewhere(verdict))) => verdict,
+        Ok(Some(Outcome::Elsewhere(verdict))) => verdict.and(case),
         Ok(Some(Outcome::Compared)) => match (case.failures(), case.comparisons()) {
             (failures, _) if !failures.is_empty() => Verdict::Failed(failures),
             (_, 0) => Verdict::Failed(vec!["nothing was compared".into()]),
@@ -55,7 +69,7 @@ pub(crate) fn case_files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// The cases of `tests/golden`, all of which are computed on every device of burn.
-const CASES: usize = 100;
+const CASES: usize = 104;
 /// Those that are not computed; whoever adds one says here that it is known.
 const NOT_COMPUTED: [&str; 0] = [];
 

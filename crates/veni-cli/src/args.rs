@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use veni_image::ReadOptions;
 
 /// Which model decodes (and encodes).
 #[derive(Args, Debug)]
@@ -22,6 +23,21 @@ pub(crate) struct Decoding {
     /// What decodes
     #[arg(long, value_enum, default_value_t)]
     pub(crate) device: DecodeDevice,
+}
+
+/// Which layer of an EXR file is the picture.
+#[derive(Args, Clone, Debug, Default)]
+pub(crate) struct Layer {
+    /// Layer of EXR files that have several [default: the one without a name, or called like a picture: Combined, beauty, C]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) layer: Option<String>,
+}
+
+impl Layer {
+    /// What is read of a panorama.
+    pub(crate) fn options(&self) -> ReadOptions {
+        ReadOptions { layer: self.layer.clone(), ..ReadOptions::default() }
+    }
 }
 
 /// Whether existing files may be replaced.

@@ -14,19 +14,19 @@ pub(crate) fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A number of a range, ends included.
-fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
-    match finite(text)? {
-        v if (low..=high).contains(&v) => Ok(v),
-        v => Err(format!("{v} is not between {low} and {high}")),
-    }
-}
-
 /// More than 0.
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match finite(text)? {
         v if v > 0.0 => Ok(v),
         v => Err(format!("{v} is not more than 0")),
+    }
+}
+
+/// A number of a range, ends included.
+fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
+    match finite(text)? {
+        v if (low..=high).contains(&v) => Ok(v),
+        v => Err(format!("{v} is not between {low} and {high}")),
     }
 }
 
@@ -85,6 +85,7 @@ mod tests {
         assert_eq!(lights("64"), Ok(64));
         assert!(lights("7").is_err() && lights("0").is_err() && lights("99999").is_err());
         assert!(elevation("91").is_err() && finite("inf").is_err());
+        assert!(positive("0").unwrap_err().contains("more than 0") && positive("0.5") == Ok(0.5));
         assert!(stops("-65").unwrap_err().contains("64 stops"));
     }
 }

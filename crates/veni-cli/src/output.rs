@@ -118,10 +118,14 @@ pub(crate) fn refuse_existing(path: &Path, overwrite: Overwrite) -> Result<()> {
     output::refuse_existing(path, overwrite).map_err(with_remedy)
 }
 
+/// What can be done about a file with several layers.
+pub(crate) const CHOOSE_LAYER: &str = "--layer NAME chooses one";
+
 /// Adds what can be done here, of which the library knows nothing.
 pub(crate) fn with_remedy(error: Error) -> anyhow::Error {
     let remedy = match &error {
         Error::Exists { .. } => return anyhow!("{error}; --force replaces it"),
+        Error::Layers { .. } => return anyhow!("{error}; {CHOOSE_LAYER}"),
         Error::LowRange { .. } => return anyhow!("{error}, as 'veni-cli prepare' does"),
         Error::Io { action: "write", source, .. } => match source.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {

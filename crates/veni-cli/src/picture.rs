@@ -77,11 +77,6 @@ impl Picture {
         }
     }
 
-    /// Whether the image is a latitude-longitude panorama.
-    pub(crate) fn is_latlong(&self) -> bool {
-        self.layout == Layout::Equirect
-    }
-
     /// What the file says about itself.
     pub(crate) fn attributes(&self, latent: &Latent, model: &str) -> Result<BTreeMap<String, String>> {
         let mut attributes = BTreeMap::from([

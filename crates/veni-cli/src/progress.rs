@@ -1,7 +1,6 @@
 //! Progress on stderr: a bar on a terminal, a plain line every few seconds in a log, nothing with `--quiet`.
 
 mod bar;
-#[cfg(feature = "learn")]
 mod library;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -57,7 +56,6 @@ impl Bars {
     }
 
     /// A remark, above the bar if there is one.
-    #[cfg(feature = "learn")]
     pub(crate) fn note(&self, text: &str) {
         match self.current().as_ref() {
             Some(work) => work.bar.note(text),

@@ -4,9 +4,10 @@ mod encoding;
 mod image;
 mod latent;
 mod model;
+mod remembered;
 
 pub(crate) use encoding::{Encoded, Encoding};
-pub(crate) use image::panorama;
+pub(crate) use image::{notes, panorama};
 pub(crate) use latent::{from_file, is_latent, model_of, seeded};
 #[cfg(feature = "learn")]
 pub(crate) use model::model_file;

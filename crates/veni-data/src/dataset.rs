@@ -6,9 +6,10 @@ use std::sync::Arc;
 
 use crate::parallel::parallel;
 use crate::pixels::Pixels;
+use crate::whole::whole;
 use crate::{Error, Result};
-use veni_image::Panorama;
 use veni_image::exposure::centre_exposure;
+use veni_image::{Budget, Panorama, ReadOptions};
 use veni_light::progress::{Observer, Silent};
 use veni_light::sphere::Equirect;
 
@@ -66,22 +67,28 @@ impl Dataset {
         Self { grid, items: Arc::new(items) }
     }
 
-    /// Reads, cleans and resamples files, in parallel; the order is kept. As many files as there are processors are
-    /// in memory at their full size at a time.
+    /// Reads, cleans and resamples files, in parallel; the order is kept. At most as many files as there are processors are
+    /// in memory at their full size at a time, fewer where their pixels are more than [`Budget::shared`].
     ///
     /// # Errors
     /// The first file (in order) that cannot be read, by name.
     pub fn load(files: &[PathBuf], grid: Equirect) -> Result<Self> {
-        Self::load_observed(files, grid, &Silent)
+        Self::load_observed(files, grid, &ReadOptions::default(), &Silent)
     }
 
-    /// [`Dataset::load`] with an observer of its progress.
+    /// [`Dataset::load`] with limits of what is read, and an observer of its progress, who is told what files say that is not
+    /// applied.
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn load_observed(files: &[PathBuf], grid: Equirect, observer: &dyn Observer) -> Result<Self> {
+    pub fn load_observed(
+        files: &[PathBuf],
+        grid: Equirect,
+        options: &ReadOptions,
+        observer: &dyn Observer,
+    ) -> Result<Self> {
         observer.begin("panorama", "loading", 0, files.len());
-        Ok(Self::new(grid, load(files, grid, |_, item| Ok(item), observer)?))
+        Ok(Self::new(grid, load(files, grid, options, |_, item| Ok(item), observer)?))
     }
 
     /// Only the panoramas that are wanted.
@@ -124,11 +131,14 @@ impl Dataset {
 pub(super) fn load(
     files: &[PathBuf],
     grid: Equirect,
+    options: &ReadOptions,
     keep: impl Fn(usize, Item) -> Result<Item> + Sync,
     observer: &dyn Observer,
 ) -> Result<Vec<Item>> {
     parallel(files.len(), |at| {
-        let item = keep(at, read_item(&files[at], grid)?)?;
+        let claim = Budget::shared().claim_file(&files[at], options);
+        let item = keep(at, read_item(&files[at], grid, options, observer)?)?;
+        drop(claim);
         observer.advance(1);
         Ok(item)
     })
@@ -155,8 +165,11 @@ pub fn panorama_files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn read_item(path: &Path, grid: Equirect) -> Result<Item> {
-    let mut panorama = Panorama::read(path)?;
-    panorama.sanitise().map_err(|e| e.in_file(path))?;
+fn read_item(path: &Path, grid: Equirect, options: &ReadOptions, observer: &dyn Observer) -> Result<Item> {
+    let mut panorama = Panorama::read_with(path, options)?;
+    for note in panorama.notes() {
+        observer.note(&format!("{}: {note}", path.display()));
+    }
+    whole(&mut panorama).and_then(|()| panorama.sanitise()).map_err(|e| e.in_file(path))?;
     Ok(Item::new(path, &panorama, grid))
 }

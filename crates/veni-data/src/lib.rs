@@ -8,6 +8,7 @@ pub mod coarsen;
 mod dataset;
 pub mod expand;
 mod fold;
+pub mod limits;
 pub mod parallel;
 mod pixel_storage;
 mod pixels;
@@ -15,6 +16,7 @@ pub mod prepare;
 mod reconstruction;
 mod splits;
 mod store;
+mod whole;
 
 pub use veni_light::{Error, Result};
 

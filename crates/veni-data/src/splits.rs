@@ -11,6 +11,7 @@ use super::fold::Fold;
 use super::prepare::capture;
 use super::store::PixelStore;
 use crate::{Error, Result};
+use veni_image::ReadOptions;
 use veni_light::progress::{Observer, Silent};
 use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
@@ -23,6 +24,9 @@ pub struct DataConfig {
     /// Folders (or single files). A folder with `train/` and `val/` inside is used as split there; other
     /// panoramas are split by seed, files of one [`capture`](crate::prepare::capture) together.
     pub folders: Vec<PathBuf>,
+    /// Which layer of EXR files with several is the panorama ("ViewLayer.Combined").
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub layer: Option<String>,
     /// Columns of the resampled panoramas.
     pub width: usize,
     /// Rows of the resampled panoramas.
@@ -49,6 +53,7 @@ impl Default for DataConfig {
     fn default() -> Self {
         Self {
             folders: Vec::new(),
+            layer: None,
             width: 128,
             height: 64,
             val_share: 0.1,
@@ -156,7 +161,8 @@ impl Splits {
         let all = files.len().saturating_add(config.synthetic);
         let store = PixelStore::new(all, grid, config.memory_mib, scratch)?;
         observer.begin("panorama", "loading", 0, all);
-        let mut items = load(&files, grid, |at, item| store.keep(at, item), observer)?;
+        let options = ReadOptions { layer: config.layer.clone(), ..ReadOptions::default() };
+        let mut items = load(&files, grid, &options, |at, item| store.keep(at, item), observer)?;
         items.extend(generated(
             config.synthetic,
             seed,

@@ -13,7 +13,7 @@ pub enum LearningRate {
         rate: f64,
     },
     /// `rate`·t/`warm_up` below `warm_up` (so 0 in the first step); from there to `steps` half a cosine
-    /// from `rate` down to `floor`·`rate`. Beyond `steps` it stays there, or with `periodic` (the authors'
+    /// from `rate` down to `floor`·`rate`. Beyond `steps` it stays there, or with `periodic` (the reference's
     /// program, whose cosine is not cut off) rises again.
     Cosine {
         /// The highest rate.

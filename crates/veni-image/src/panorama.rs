@@ -4,10 +4,16 @@ use std::collections::BTreeMap;
 
 use veni_light::sphere::Equirect;
 
+use crate::provenance::Provenance;
 use crate::{exposure, luminance};
 
-/// Added to radiance before the logarithm, ln(L + 1e-8), so that the darkest values stay bounded.
+/// Added to radiance before the logarithm, ln(L + 1e-8), so that the darkest values stay bounded: of panoramas whose
+/// mean luminance lies within 2⁻¹² and 2¹². That of others is as much smaller or larger as they are
+/// ([`Panorama::log_floor`]).
 pub const LOG_FLOOR: f32 = 1e-8;
+
+/// Octaves of mean luminance to either side of 1 in which [`LOG_FLOOR`] is what it says.
+const ORDINARY: f64 = 12.0;
 
 /// Linear Rec. 709 radiance on an equirectangular grid, with the text attributes of its file.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +21,10 @@ pub struct Panorama {
     pub(crate) grid: Equirect,
     pub(crate) pixels: Vec<[f32; 3]>,
     pub(crate) attributes: BTreeMap<String, String>,
+    pub(crate) provenance: Provenance,
+    /// How much of each pixel is known, 0 to 1, unless all of all is.
+    pub(crate) known: Option<Vec<f32>>,
+    pub(crate) notes: Vec<String>,
 }
 
 impl Panorama {
@@ -25,10 +35,17 @@ impl Panorama {
     pub fn new(grid: Equirect, pixels: Vec<[f32; 3]>) -> Self {
         let Equirect { width, height } = grid;
         assert_eq!(pixels.len(), grid.len(), "a {width} × {height} panorama got {} pixels", pixels.len());
-        Self { grid, pixels, attributes: BTreeMap::new() }
+        Self {
+            grid,
+            pixels,
+            attributes: BTreeMap::new(),
+            provenance: Provenance::Unrecorded,
+            known: None,
+            notes: Vec::new(),
+        }
     }
 
-    /// A panorama from natural-log radiance, the inverse of [`Panorama::log`] up to [`LOG_FLOOR`].
+    /// A panorama from natural-log radiance, the inverse of [`Panorama::log`] up to [`Panorama::log_floor`].
     ///
     /// # Panics
     /// If there are not exactly W·H pixels.
@@ -84,16 +101,60 @@ impl Panorama {
         &self.attributes
     }
 
-    /// Natural-log radiance ln(L + [`LOG_FLOOR`]), row-major: what encoder and losses work on. The panorama
-    /// must be clean ([`Panorama::sanitise`]); a negative value gives NaN.
-    pub fn log(&self) -> Vec<[f32; 3]> {
-        self.pixels.iter().map(|pixel| pixel.map(|v| (v + LOG_FLOOR).ln())).collect()
+    /// Whether the file that this was read from still had the pixels that its attributes were written with. Where it had
+    /// not, what they say of the pixels is not so, and no factor was divided out.
+    pub fn provenance(&self) -> Provenance {
+        self.provenance
     }
 
-    /// Solid-angle-weighted mean of ln(luminance + [`LOG_FLOOR`]) over the sphere: the `log_exposure` that is
+    /// How much of each pixel is known, 0 to 1, row-major; `None` if all of all. What is transparent in its file, or lies
+    /// outside of the part that the file holds, is unknown; its radiance is 0 until [`Panorama::fill`].
+    pub fn known(&self) -> Option<&[f32]> {
+        self.known.as_deref()
+    }
+
+    /// Share of the pixels (0 to 1) of which less than half is known.
+    pub fn unknown(&self) -> f64 {
+        unknown_share(self.known.as_deref())
+    }
+
+    /// What its file says that is not applied, or is worth knowing; sentences without the file's name.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// For readers, as soon as attributes and the values as they are stored are there.
+    pub(crate) fn note_provenance(&mut self) {
+        self.provenance = Provenance::of(&self.attributes, self.grid, &self.pixels);
+    }
+
+    /// The power of two nearest to the mean luminance of the pixels, or 1 if that is within 2⁻¹² and 2¹²: what a radiance that is
+    /// small or large for this panorama is measured by.
+    pub fn unit(&self) -> f32 {
+        let sum: f64 = self.pixels.iter().map(|&p| f64::from(luminance(p))).sum();
+        let octaves = (sum / self.pixels.len() as f64).log2();
+        // a black panorama has -∞ octaves, a damaged one NaN
+        if octaves.is_finite() && octaves.abs() > ORDINARY { octaves.round().exp2() as f32 } else { 1.0 }
+    }
+
+    /// What is added to radiance before the logarithm: [`LOG_FLOOR`] times [`Panorama::unit`], so that a panorama in
+    /// other units has the same log radiance but for a constant.
+    pub fn log_floor(&self) -> f32 {
+        LOG_FLOOR * self.unit()
+    }
+
+    /// Natural-log radiance ln(L + [`Panorama::log_floor`]), row-major: what encoder and losses work on. The panorama
+    /// must be clean ([`Panorama::sanitise`]); a negative value gives NaN.
+    pub fn log(&self) -> Vec<[f32; 3]> {
+        let floor = self.log_floor();
+        self.pixels.iter().map(|pixel| pixel.map(|v| (v + floor).ln())).collect()
+    }
+
+    /// Solid-angle-weighted mean of ln(luminance + [`Panorama::log_floor`]) over the sphere: the `log_exposure` that is
     /// subtracted from the log radiance before encoding and added back after decoding.
     pub fn mean_log_luminance(&self) -> f32 {
-        let logs = self.pixels.iter().map(|&p| f64::from(luminance(p) + LOG_FLOOR).ln());
+        let floor = self.log_floor();
+        let logs = self.pixels.iter().map(|&p| f64::from(luminance(p) + floor).ln());
         exposure::over_sphere(self.grid, &logs.collect::<Vec<_>>())
     }
 
@@ -103,6 +164,13 @@ impl Panorama {
             *pixel = pixel.map(|v| v * factor);
         }
     }
+}
+
+/// Share of the pixels of which less than half is known.
+pub(crate) fn unknown_share(known: Option<&[f32]>) -> f64 {
+    let Some(known) = known else { return 0.0 };
+    let hidden = known.iter().filter(|k| **k < 0.5).count();
+    hidden as f64 / known.len().max(1) as f64
 }
 
 #[cfg(test)]
@@ -118,6 +186,41 @@ mod tests {
         assert!((sky.mean_log_luminance() - before - 3f32.ln()).abs() < 1e-6);
         let uniform = Panorama::new(grid, vec![[2.0; 3]; grid.len()]);
         assert!((uniform.mean_log_luminance() - 2f32.ln()).abs() < 1e-6);
+    }
+
+    /// Units of radiance are a matter of taste: whatever they are, the log radiance differs by a constant only, and so
+    /// does the exposure. A black corner shows the floor.
+    #[test]
+    fn the_floor_follows_the_units() {
+        let grid = Equirect::new(32, 16);
+        let sky = |factor: f32| {
+            let radiance = |[x, y, z]: [f32; 3]| {
+                if x > 0.9 { [1e-7 * factor; 3] } else { [2.0 + x, 1.5 + y, 1.1 + z].map(|v| v * factor) }
+            };
+            Panorama::from_fn(grid, radiance)
+        };
+        let one = sky(1.0);
+        assert_eq!((one.unit(), one.log_floor()), (1.0, LOG_FLOOR));
+        for factor in [1e-8, 1e8, 1e-24, 1e24] {
+            let other = sky(factor);
+            let shift = factor.ln();
+            assert!((other.mean_log_luminance() - one.mean_log_luminance() - shift).abs() < 0.01, "{factor}");
+            // the unit is a power of two, the factor is not: the floor is off by a factor of √2 at most
+            let (bright, dark) = (0, 8 * 32 + 16);
+            let differs = |at: usize| (other.log()[at][1] - one.log()[at][1] - shift).abs();
+            assert!(one.pixels()[dark][1] < 1e-6 && one.pixels()[bright][1] > 0.5);
+            assert!(
+                differs(bright) < 1e-5 && differs(dark) < 0.1,
+                "{factor}: {} {}",
+                differs(bright),
+                differs(dark)
+            );
+        }
+        // a power of two changes nothing but that
+        let (a, b) = (sky(1e-8), sky(1e-8 * 0.125));
+        assert!(a.pixels().iter().zip(b.pixels()).all(|(a, b)| a[0] * 0.125 == b[0]));
+        assert_eq!(a.log_floor() * 0.125, b.log_floor());
+        assert_eq!(Panorama::new(grid, vec![[0.0; 3]; grid.len()]).unit(), 1.0);
     }
 
     #[test]

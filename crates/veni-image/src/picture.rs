@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use crate::tonemap::srgb_to_linear;
-use crate::{Error, LdrPanorama, Panorama, ReadOptions, Result, Transfer, luminance};
+use crate::{Content, Error, ReadOptions, Result, Transfer, luminance};
 
 /// A display value from here on is taken for clipped.
 const CLIPPED: f32 = 254.0 / 255.0;
@@ -15,6 +14,7 @@ pub struct Picture {
     pixels: Vec<[f32; 3]>,
     known: Option<Vec<f32>>,
     clip: Option<f32>,
+    notes: Vec<String>,
 }
 
 impl Picture {
@@ -29,7 +29,7 @@ impl Picture {
             let pixels = pixels.len();
             return Err(Error::invalid(format!("a picture of {width} × {height} has {pixels} pixels")));
         }
-        Ok(Self { size, pixels, known: None, clip: None })
+        Ok(Self { size, pixels, known: None, clip: None, notes: Vec::new() })
     }
 
     /// How much of each pixel is known, 0 to 1 (NaN: nothing); times what was known before.
@@ -57,24 +57,29 @@ impl Picture {
         Self { clip: Some(clip), ..self }
     }
 
-    /// Reads a file of any format that this crate reads. What is transparent, or outside of an EXR file's data window, is
-    /// unknown; display values are linearised by the sRGB curve, and their maximum counts as clipped.
+    /// [`Picture::read_with`] without wishes; any width and height.
     ///
     /// # Errors
-    /// As [`Panorama::read_with`] and [`LdrPanorama::read_with`].
+    /// As [`Content::read`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        let (path, options) = (path.as_ref(), any_aspect());
-        if LdrPanorama::recognise(path)? {
-            let image = LdrPanorama::read_with(path, &options)?;
-            let size = [image.grid().width, image.grid().height];
-            let known = image.alpha().map(<[f32]>::to_vec);
-            let pixels = image.linear(Transfer::Srgb).into_pixels();
-            return Ok(Self { size, pixels, known, clip: Some(srgb_to_linear(CLIPPED)) });
-        }
-        let image = Panorama::read_with(path, &options)?;
-        let size = [image.grid().width, image.grid().height];
-        let known = Panorama::read_alpha(path, &options)?.filter(|a| a.iter().any(|a| *a < 1.0));
-        Ok(Self { size, pixels: image.into_pixels(), known, clip: None })
+        Self::read_with(path, &any_aspect())
+    }
+
+    /// Reads a file of any format that this crate reads. What is transparent, or outside of what an EXR file or a part of a
+    /// panorama holds, is unknown; display values are linearised as the file says, and their maximum counts as clipped.
+    ///
+    /// # Errors
+    /// As [`Content::read`].
+    pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
+        let (panorama, clip) = match Content::read(path, options)? {
+            Content::Radiance(panorama) => (panorama, None),
+            Content::Display(image) => {
+                let clip = image.linear_value(CLIPPED);
+                (image.linear(Transfer::Srgb), Some(clip))
+            }
+        };
+        let size = [panorama.grid.width, panorama.grid.height];
+        Ok(Self { size, pixels: panorama.pixels, known: panorama.known, clip, notes: panorama.notes })
     }
 
     /// Width and height.
@@ -97,6 +102,11 @@ impl Picture {
         self.clip
     }
 
+    /// What its file says that is not applied, or is worth knowing; sentences without the file's name.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     /// Whether some of its pixels are unknown.
     pub fn is_partial(&self) -> bool {
         let hidden = self.known.as_ref().is_some_and(|known| known.iter().any(|k| *k < 1.0));
@@ -115,13 +125,10 @@ impl Picture {
 /// # Errors
 /// As [`Picture::read`].
 pub fn read_mask(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<f32>)> {
-    let (path, options) = (path.as_ref(), any_aspect());
-    let (grid, values, alpha) = if LdrPanorama::recognise(path)? {
-        let image = LdrPanorama::read_with(path, &options)?;
-        (image.grid(), image.values().to_vec(), image.alpha().map(<[f32]>::to_vec))
-    } else {
-        let image = Panorama::read_with(path, &options)?;
-        (image.grid(), image.into_pixels(), Panorama::read_alpha(path, &options)?)
+    let options = ReadOptions { data: true, ..any_aspect() };
+    let (grid, values, alpha) = match Content::read(path, &options)? {
+        Content::Display(image) => (image.grid(), image.values, image.known),
+        Content::Radiance(image) => (image.grid(), image.pixels, image.known),
     };
     // of grey the weights' sum could miss 1 by the last bit, and white must be known as a whole
     let grey = |[r, g, b]: [f32; 3]| if r == g && g == b { r } else { luminance([r, g, b]) };

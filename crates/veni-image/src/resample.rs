@@ -31,8 +31,40 @@ impl Panorama {
     }
 
     /// [`Panorama::turn`] and [`Panorama::resample`] in one pass, with one interpolation instead of two.
+    ///
+    /// Where some of the panorama is unknown, each pixel is the mean of what is known under it.
     #[must_use]
     pub fn resample_turned(&self, grid: Equirect, radians: f64) -> Self {
+        let Some(known) = &self.known else {
+            let pixels = self.average(&self.pixels, grid, radians);
+            return Self { grid, pixels, known: None, ..self.without_pixels() };
+        };
+        let weighted: Vec<_> = self.pixels.iter().zip(known).map(|(p, k)| p.map(|v| v * k)).collect();
+        let weights: Vec<_> = known.iter().map(|k| [*k; 3]).collect();
+        let mut pixels = self.average(&weighted, grid, radians);
+        let weights = self.average(&weights, grid, radians);
+        for (pixel, [weight, ..]) in pixels.iter_mut().zip(&weights) {
+            *pixel = if *weight > 0.0 { pixel.map(|v| v / weight) } else { [0.0; 3] };
+        }
+        let known = weights.iter().map(|w| w[0]).collect();
+        Self { grid, pixels, known: Some(known), ..self.without_pixels() }
+    }
+
+    /// All that does not depend on the size.
+    fn without_pixels(&self) -> Self {
+        let (attributes, notes) = (self.attributes.clone(), self.notes.clone());
+        Self {
+            grid: self.grid,
+            pixels: Vec::new(),
+            attributes,
+            provenance: self.provenance,
+            known: None,
+            notes,
+        }
+    }
+
+    /// Values on the grid of this panorama, brought to another.
+    fn average(&self, values: &[[f32; 3]], grid: Equirect, radians: f64) -> Vec<[f32; 3]> {
         let rows = row_taps(self.grid.height, grid.height);
         let columns = column_taps(self.grid.width, grid.width, shift(self.grid.width, radians));
         let width = self.grid.width;
@@ -42,7 +74,7 @@ impl Panorama {
             |merged, (out, row)| {
                 merged.fill([0.0; 3]);
                 for &(j, weight, beyond) in row {
-                    let source = &self.pixels[j * width..][..width];
+                    let source = &values[j * width..][..width];
                     let (left, right) = source.split_at(if beyond { width / 2 } else { 0 });
                     for (sum, pixel) in merged.iter_mut().zip(right.iter().chain(left)) {
                         for (s, &v) in sum.iter_mut().zip(pixel) {
@@ -61,7 +93,7 @@ impl Panorama {
                 }
             },
         );
-        Self { grid, pixels, attributes: self.attributes.clone() }
+        pixels
     }
 
     /// The mirror image (x, y, z) → (x, −y, z): columns in reverse order.
@@ -71,6 +103,8 @@ impl Panorama {
         for row in mirrored.pixels.chunks_exact_mut(self.grid.width) {
             row.reverse();
         }
+        let known = mirrored.known.iter_mut().flat_map(|known| known.chunks_exact_mut(self.grid.width));
+        known.for_each(<[f32]>::reverse);
         mirrored
     }
 }

@@ -21,6 +21,16 @@ pub enum Error {
         /// Its format ("PNG").
         format: &'static str,
     },
+    /// A file with several layers, of which one must be named, or without the one that was.
+    #[error("{}: {}", path.display(), layers_message(wanted.as_deref(), layers))]
+    Layers {
+        /// The file, once it is known.
+        path: PathBuf,
+        /// The layer that was named and is not there.
+        wanted: Option<String>,
+        /// The layers that there are.
+        layers: Vec<String>,
+    },
     /// A file that was to be written is there already, and [`Overwrite`](crate::output::Overwrite) refuses.
     #[error("{}: exists already", path.display())]
     Exists {
@@ -64,6 +74,11 @@ impl Error {
         Self::TooLarge(message.into())
     }
 
+    /// An [`Error::Layers`] of a file that [`Error::in_file`] will name.
+    pub fn layers(wanted: Option<impl Into<String>>, layers: Vec<String>) -> Self {
+        Self::Layers { path: PathBuf::new(), wanted: wanted.map(Into::into), layers }
+    }
+
     /// An [`Error::Exists`] for `path`.
     pub fn exists(path: impl AsRef<Path>) -> Self {
         Self::Exists { path: path.as_ref().to_path_buf() }
@@ -86,9 +101,14 @@ impl Error {
             Self::Invalid(message) => Self::Invalid(named(message)),
             Self::Unsupported(message) => Self::Unsupported(named(message)),
             Self::TooLarge(message) => Self::TooLarge(named(message)),
-            other @ (Self::LowRange { .. } | Self::Exists { .. } | Self::Cancelled | Self::Io { .. }) => {
-                other
+            Self::Layers { path: known, wanted, layers } if known.as_os_str().is_empty() => {
+                Self::Layers { path: path.as_ref().to_path_buf(), wanted, layers }
             }
+            other @ (Self::Layers { .. }
+            | Self::LowRange { .. }
+            | Self::Exists { .. }
+            | Self::Cancelled
+            | Self::Io { .. }) => other,
         }
     }
 
@@ -98,6 +118,14 @@ impl Error {
             Self::Io { source, .. } => format!("{self}: {source}"),
             _ => self.to_string(),
         }
+    }
+}
+
+fn layers_message(wanted: Option<&str>, layers: &[String]) -> String {
+    let list = layers.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
+    match wanted {
+        Some(wanted) => format!("no layer {wanted:?} that is a picture; there are: {list}"),
+        None => format!("several layers could be meant; choose one of: {list}"),
     }
 }
 

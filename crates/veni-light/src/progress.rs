@@ -7,6 +7,9 @@ pub trait Observer: Sync {
 
     /// This many more units of the task that began last are done.
     fn advance(&self, units: usize);
+
+    /// Something worth knowing that stops nothing, in a sentence.
+    fn note(&self, _sentence: &str) {}
 }
 
 /// Nobody observes.

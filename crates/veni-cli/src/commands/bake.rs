@@ -7,11 +7,11 @@ use anyhow::{Result, bail};
 use clap::{ArgGroup, Args, ValueEnum};
 use serde_json::json;
 use veni_image::tonemap::{Curve, Tonemap};
-use veni_image::{Precision, WriteFormat, WriteOptions};
+use veni_image::{HALF_RANGE, Precision, WriteFormat, WriteOptions};
 use veni_light::latent::Latent;
 use veni_light::output::Overwrite;
 
-use crate::args::{Decoding, Force};
+use crate::args::{Decoding, Force, Layer};
 use crate::device::Device;
 use crate::features::{GPU, only};
 use crate::output::{self, with_remedy};
@@ -21,9 +21,6 @@ use crate::report::{self, Outcome, Report};
 use crate::size::Size;
 use crate::skies::{self, Change, Job, Many, Sky, Target};
 use crate::source::{self, Loaded};
-
-/// The largest finite half-precision number.
-const HALF_MAX: f32 = 65504.0;
 
 /// Stands where no PNG is written.
 const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
@@ -79,7 +76,8 @@ pub(crate) struct Bake {
     #[command(flatten)]
     change: Change,
 
-    /// EXR in half precision; fails where radiance exceeds 65504 [default: half if that holds it, else float]
+    /// EXR in half precision; fails where radiance exceeds 65504, or is below 6.1e-5, where half precision loses bits
+    /// [default: half if it keeps all, else float]
     #[arg(long, conflicts_with = "float")]
     half: bool,
 
@@ -94,6 +92,9 @@ pub(crate) struct Bake {
     /// Axes that a cube map's faces are named by, and that the file says its directions have
     #[arg(long, value_enum)]
     frame: Option<FrameName>,
+
+    #[command(flatten)]
+    layer: Layer,
 
     #[command(flatten)]
     decoding: Decoding,
@@ -131,7 +132,7 @@ impl Bake {
     ) -> Result<()> {
         let overwrite = Overwrite::from(self.force);
         let named = match &job.sky {
-            Sky::File(path) => source::from_file(path, loaded, report)?,
+            Sky::File(path) => source::from_file(path, &self.layer, loaded, report)?,
             Sky::Seed(seed) => source::seeded(&loaded.model, *seed),
         };
         let latent = self.change.of(&named);
@@ -148,11 +149,7 @@ impl Bake {
                     *p = precision;
                 }
                 let attributes = attributes.clone();
-                let latlong = picture.is_latlong();
-                Ok((
-                    path.clone(),
-                    WriteOptions { attributes, overwrite, latlong, ..WriteOptions::new(format) },
-                ))
+                Ok((path.clone(), WriteOptions { attributes, overwrite, ..WriteOptions::new(format) }))
             };
             job.files.iter().map(file).collect()
         };
@@ -163,15 +160,13 @@ impl Bake {
         };
         let bars = Bars::new(report);
         loop {
-            let (files, mut too_bright) = (files(precision)?, None);
+            let (files, mut range) = (files(precision)?, Range::default());
             let watch = may_change && precision == Precision::Half && has_exr(&files);
             bars.begin("", "row", Some(picture.grid().height as u64));
             let result = output::write_all(&files, picture.grid(), &mut |push| {
                 baker.rows(picture.directions(), &mut |row| {
-                    if watch
-                        && let Some(v) = row.as_flattened().iter().find(|v| **v > HALF_MAX && v.is_finite())
-                    {
-                        too_bright = Some(*v);
+                    range.see(row)?;
+                    if watch && range.beyond_half().is_some() {
                         return Err(veni_light::Error::invalid("beyond the range of half precision"));
                     }
                     bars.add(1);
@@ -179,18 +174,26 @@ impl Bake {
                 })
             });
             bars.end();
-            match (result, too_bright) {
-                (_, Some(value)) => {
-                    report.note(format_args!(
-                        "radiance of {value:.0} is beyond half precision ({HALF_MAX}): writing floats"
-                    ));
+            match (result, range.beyond_half()) {
+                (Ok(()), _) => break,
+                (Err(_), Some(value)) if watch && value >= f32::MIN_POSITIVE => {
+                    let [least, most] = HALF_RANGE;
+                    report.note(if value > most {
+                        format!("radiance of {value:.0} is beyond half precision ({most}): writing floats")
+                    } else {
+                        format!("half precision loses bits of a radiance of {value:.1e} (below {least:.1e}): writing floats")
+                    });
                     precision = Precision::Float;
                 }
-                (Err(error @ veni_light::Error::Invalid(_)), None) if self.half => {
-                    bail!("{error} (leave --half out, or darken with --exposure -1 …)")
+                (Err(error @ veni_light::Error::Invalid(_)), Some(value)) if self.half => {
+                    let change = if value > HALF_RANGE[1] {
+                        "darken with --exposure -1 …"
+                    } else {
+                        "brighten with --exposure 1 …"
+                    };
+                    bail!("{error} (leave --half out, or {change})")
                 }
-                (Err(error), None) => return Err(with_remedy(error)),
-                (Ok(()), None) => break,
+                (Err(error), _) => return Err(with_remedy(error)),
             }
         }
         self.report(&job.files, picture, &latent, precision, device.name(), started, report)
@@ -231,6 +234,42 @@ impl Bake {
             "seconds": seconds,
         });
         report.result(human, &value)
+    }
+}
+
+/// The smallest and the largest value of what is baked.
+#[derive(Clone, Copy, Debug)]
+struct Range {
+    low: f32,
+    high: f32,
+}
+
+impl Default for Range {
+    fn default() -> Self {
+        Self { low: f32::INFINITY, high: 0.0 }
+    }
+}
+
+impl Range {
+    /// Radiance is an exponential: where it is 0, or has lost bits already, it is too small for a number.
+    fn see(&mut self, row: &[[f32; 3]]) -> veni_light::Result<()> {
+        for value in row.as_flattened().iter().filter(|v| v.is_finite()) {
+            (self.low, self.high) = (self.low.min(*value), self.high.max(*value));
+        }
+        if self.low < f32::MIN_POSITIVE {
+            return Err(veni_light::Error::invalid(format!(
+                "a radiance of {:e} is below {:.1e}, the smallest number with all its bits: the exposure is too low",
+                self.low,
+                f32::MIN_POSITIVE
+            )));
+        }
+        Ok(())
+    }
+
+    /// The value that half precision does not keep, if there is one.
+    fn beyond_half(self) -> Option<f32> {
+        let [least, most] = HALF_RANGE;
+        [self.high].into_iter().find(|v| *v > most).or(Some(self.low).filter(|v| *v < least))
     }
 }
 

@@ -11,7 +11,7 @@ use veni_image::tonemap::Tonemap;
 use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
 
-use crate::args::{Force, ModelArgs};
+use crate::args::{Force, Layer, ModelArgs};
 use crate::latent_files::LatentFiles;
 use crate::output::{self, with_remedy};
 use crate::progress::Bars;
@@ -26,7 +26,8 @@ const PREVIEW: [usize; 2] = [256, 128];
 #[derive(Args, Debug)]
 #[command(
     long_about = "Turn HDR panoramas into latents.\n\n\
-        Panoramas are equirectangular OpenEXR or Radiance files of any size, z up; they are resampled, and their \
+        Panoramas are equirectangular OpenEXR or Radiance files of any size (or PNG, AVIF and JPEG files of high dynamic \
+        range: PQ, HLG, gain maps), z up; they are resampled, and their \
         exposure is taken out and recorded in the latent, so that baking the latent gives the original level. The \
         result line says how well the latent reproduces the panorama: PSNR of the tonemapped images.",
     after_help = "Without -o and --out-dir the latent itself goes to stdout, one line of JSON per panorama.\n\n\
@@ -48,6 +49,9 @@ pub(crate) struct Encode {
     /// Also write a PNG: panorama | reconstruction, one pair per row
     #[arg(long, value_name = "OUT.png")]
     preview: Option<PathBuf>,
+
+    #[command(flatten)]
+    layer: Layer,
 
     #[command(flatten)]
     model: ModelArgs,
@@ -74,7 +78,7 @@ impl Encode {
         let mut failed = Vec::new();
         for (at, path) in own {
             let encode = || -> Result<Encoded> {
-                let encoded = encoding.encode_file(path, report)?;
+                let encoded = encoding.encode_file(path, &self.layer, report)?;
                 if let Some(output) = outputs.get(at) {
                     encoded.latent.save(output, overwrite).map_err(with_remedy)?;
                 }

@@ -21,6 +21,7 @@ use veni_light::Error;
 use veni_light::output::{Overwrite, write_atomic};
 use veni_light::sphere::Equirect;
 
+use crate::args::Layer;
 use crate::output::with_remedy;
 use crate::part::fold;
 use crate::progress::Bars;
@@ -67,6 +68,9 @@ pub(crate) struct Evaluate {
     /// Folders of panoramas (or files)
     #[arg(long, value_name = "DIR", num_args = 1.., required = true)]
     data: Vec<PathBuf>,
+
+    #[command(flatten)]
+    layer: Layer,
 
     /// Folder of tables, figures and kept results, created if missing
     #[arg(long, short, value_name = "OUT")]
@@ -186,7 +190,7 @@ impl Evaluate {
         let lpips =
             if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
         let bars = Bars::new(report);
-        let data = Dataset::load_observed(&files, grid, &bars);
+        let data = Dataset::load_observed(&files, grid, &self.layer.options(), &bars);
         bars.end();
         let data = data.map_err(with_remedy)?;
         inputs::create_folder(&self.out)?;

@@ -13,7 +13,7 @@ use veni_light::Error;
 use veni_light::light::{EnvironmentMap, LightOptions};
 use veni_light::output::{self as files, Overwrite};
 
-use crate::args::{Force, ModelArgs};
+use crate::args::{Force, Layer, ModelArgs};
 use crate::numbers::positive;
 use crate::output::{self, with_remedy};
 use crate::report::{Outcome, Report};
@@ -91,6 +91,9 @@ pub(crate) struct Light {
     size: Option<Size>,
 
     #[command(flatten)]
+    layer: Layer,
+
+    #[command(flatten)]
     model: ModelArgs,
 
     #[command(flatten)]
@@ -126,7 +129,7 @@ impl Light {
             (None, Some(seed)) => Named::Seed(seed),
             (None, None) => bail!("name a panorama, a latent or a seed"),
         };
-        let Input { name, panorama, unit } = input::read(named, &self.model, size, report)?;
+        let Input { name, panorama, unit } = input::read(named, &self.model, &self.layer, size, report)?;
         let options = LightOptions {
             sun: self.sun.0,
             sun_radius: self.sun_radius.map(|r| r.to_radians() as f32),

@@ -7,6 +7,7 @@ pub(crate) mod encode;
 #[cfg(feature = "learn")]
 pub(crate) mod evaluate;
 pub(crate) mod fit;
+pub(crate) mod ibl;
 pub(crate) mod inspect;
 pub(crate) mod light;
 pub(crate) mod man;

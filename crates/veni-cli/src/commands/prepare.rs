@@ -2,6 +2,7 @@
 
 mod contact;
 mod expand;
+mod gone;
 mod network;
 mod place;
 mod record;
@@ -15,10 +16,9 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use veni_data::prepare::{PrepareConfig, Shares};
-use veni_image::ReadOptions;
 use veni_light::sphere::Equirect;
 
-use crate::args::Force;
+use crate::args::{Force, Layer};
 use crate::features::{LEARN, only};
 use crate::report::{Outcome, Report};
 use crate::shard::Shard;
@@ -31,7 +31,7 @@ use store::{Settings, Store};
 #[derive(Args, Debug)]
 #[command(
     long_about = "Turn any folder of equirectangular panoramas into a training folder: \
-        train/, val/ (and test/) with half-float EXR files of one size, report.md, report.json and contact.png.\n\n\
+        train/, val/ (and test/) with EXR files of one size, report.md, report.json and contact.png.\n\n\
         Folders are searched to the bottom for OpenEXR and Radiance files and for PNG, JPEG, WebP and (feature avif) AVIF \
         images of any size. Those hold no more than a display's range: their clipped regions are found and the sun and other highlights rebuilt \
         (--expand). Every file is checked; what is broken, not twice as wide as high, too small, black, transparent or one grey \
@@ -48,8 +48,8 @@ use store::{Settings, Store};
         mixed. Where H and W are free, the panorama is continued round the sides and over the poles by 64 pixels or \
         more, to sides that are multiples of 32; where they are fixed, it is resampled to them. Panoramas for which \
         it gives NaN, infinity or negative radiance are refused.\n\n\
-        Stopped half-way, the same command continues where it was; run again, it takes in only what is new or changed. \
-        --force starts over and removes what an earlier run wrote into DIR, nothing else.",
+        Stopped half-way, the same command continues where it was; run again, it takes in only what is new or changed; \
+        images whose sources are gone are kept and listed. --force starts over and removes what an earlier run wrote into DIR, nothing else.",
     after_help = format!("Exit code 1: ready, but some files were refused.\n\n\
         Examples:\n  \
         veni-cli prepare panoramas/ -o data{}\n  \
@@ -88,6 +88,9 @@ pub(crate) struct Prepare {
     resplit: bool,
 
     #[command(flatten)]
+    layer: Layer,
+
+    #[command(flatten)]
     expand: Expand,
 
     #[command(flatten)]
@@ -107,9 +110,8 @@ impl Prepare {
             bail!("--val {} and --test {} leave nothing to train on: give less", self.val, self.test);
         }
         let (expand, network) = self.expand.expander()?;
-        let settings = Settings::new(width, height, expand.as_ref(), network);
-        let config =
-            PrepareConfig { grid: Equirect::new(width, height), expand, read: ReadOptions::default() };
+        let settings = Settings::new(width, height, expand.as_ref(), network).of_layer(&self.layer);
+        let config = PrepareConfig { grid: Equirect::new(width, height), expand, read: self.layer.options() };
         let found = scan::scan(&self.inputs, &self.output)?;
         if found.sources.is_empty() {
             bail!("{}: no image files in there; name a folder that has some", scan::names(&self.inputs));
@@ -139,8 +141,10 @@ impl Prepare {
         let placing = Placing { shares, seed: self.seed, resplit: self.resplit };
         let placed = place::place(&mut store, &placing)?;
         contact::write(&store, &placed)?;
-        report::write(&store, &settings, &placing, &placed, &found.ignored)?;
-        report::print(&self.output, &placed, report)
+        let gone = gone::sources(&placed, &found.sources);
+        gone::note(&gone, report);
+        report::write(&store, &settings, &placing, &placed, &found.ignored, &gone)?;
+        report::print(&self.output, &placed, &gone, report)
     }
 }
 

@@ -16,7 +16,7 @@ use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
 use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
 
-use crate::args::{Force, ModelArgs};
+use crate::args::{Force, Layer, ModelArgs};
 use crate::numbers::{albedo, elevation, finite, fraction, lights, shininess};
 use crate::output::{self, CAMERA, MATERIAL, with_remedy};
 use crate::report::{self, Outcome, Report};
@@ -114,6 +114,9 @@ pub(crate) struct RenderProbe {
     lights: usize,
 
     #[command(flatten)]
+    layer: Layer,
+
+    #[command(flatten)]
     model: ModelArgs,
 
     #[command(flatten)]
@@ -144,7 +147,7 @@ impl RenderProbe {
         let started = Instant::now();
         let (turn, grid) = (self.change.turn.to_radians(), scene.grid);
         let light = match &job.sky {
-            Sky::File(path) => light::from_file(path, &self.model, grid, turn, report)?,
+            Sky::File(path) => light::from_file(path, &self.layer, &self.model, grid, turn, report)?,
             Sky::Seed(seed) => light::seeded(*seed, &self.model, grid, turn)?,
         };
         let factor = self.change.exposure.exp2() as f32;
@@ -219,7 +222,7 @@ impl RenderProbe {
         let attributes = BTreeMap::from([scene.attribute(), material]);
         let tonemap = preview(&scene.surface, &image, factor);
         for path in files {
-            self.write_one(path, scene, image.clone(), tonemap, attributes.clone())?;
+            self.write_one(path, scene, image.clone(), tonemap, (true, attributes.clone()))?;
         }
         Ok(files.iter().map(|p| p.display().to_string()).collect())
     }
@@ -228,11 +231,11 @@ impl RenderProbe {
     fn write_shape(&self, scene: &Scene) -> Result<Vec<String>> {
         if let Some(path) = &self.normals {
             let normals = scene.surface.normals().to_vec();
-            self.write_one(path, scene, normals, PLAIN, BTreeMap::from([scene.attribute()]))?;
+            self.write_one(path, scene, normals, PLAIN, (false, BTreeMap::from([scene.attribute()])))?;
         }
         if let Some(path) = &self.mask {
             let mask = scene.surface.valid().iter().map(|v| [if *v { 1.0 } else { 0.0 }; 3]).collect();
-            self.write_one(path, scene, mask, PLAIN, BTreeMap::new())?;
+            self.write_one(path, scene, mask, PLAIN, (false, BTreeMap::new()))?;
         }
         Ok(self.normals.iter().chain(&self.mask).map(|p| p.display().to_string()).collect())
     }
@@ -243,14 +246,14 @@ impl RenderProbe {
         scene: &Scene,
         pixels: Vec<[f32; 3]>,
         tonemap: Tonemap,
-        attributes: BTreeMap<String, String>,
+        (colour, attributes): (bool, BTreeMap<String, String>),
     ) -> Result<()> {
         let mut format = WriteFormat::of(path, tonemap)?;
         if let WriteFormat::Exr(precision) = &mut format {
             *precision = Precision::Float;
         }
         let overwrite = Overwrite::from(self.force);
-        let options = WriteOptions { attributes, overwrite, latlong: false, ..WriteOptions::new(format) };
+        let options = WriteOptions { attributes, overwrite, colour, ..WriteOptions::new(format) };
         let size = Equirect::new(scene.surface.width(), scene.surface.height());
         Panorama::new(size, pixels).write(path, &options).map_err(with_remedy)
     }

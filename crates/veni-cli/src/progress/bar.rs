@@ -84,7 +84,6 @@ impl Bar {
     }
 
     /// A remark between two updates, above the bar if there is one.
-    #[cfg(feature = "learn")]
     pub(super) fn note(&self, text: &str) {
         match &self.view {
             View::Silent => {}

@@ -1,7 +1,8 @@
-//! Progress as the library reports it.
+//! Progress as the libraries report it.
 
+#[cfg(feature = "learn")]
 use veni_core::train::progress::{Progress, StepReport, ValidationReport};
-
+#[cfg(feature = "learn")]
 use veni_image::metrics::Scores;
 use veni_light::progress::Observer;
 
@@ -21,8 +22,13 @@ impl Observer for Bars {
     fn advance(&self, units: usize) {
         self.add(units as u64);
     }
+
+    fn note(&self, sentence: &str) {
+        Self::note(self, sentence);
+    }
 }
 
+#[cfg(feature = "learn")]
 impl Progress for &Bars {
     fn start(&mut self, done: u64, total: u64) {
         self.begin_after(done, "", "step", Some(total));

@@ -13,6 +13,7 @@ use veni_light::sphere::Equirect;
 
 use super::image::panorama;
 use super::model::Loaded;
+use crate::args::Layer;
 use crate::latent_files::source_of;
 use crate::report::Report;
 
@@ -46,8 +47,8 @@ impl<'a> Encoding<'a> {
     }
 
     /// Reads, encodes, and decodes again to compare.
-    pub(crate) fn encode_file(&self, path: &Path, report: Report) -> Result<Encoded> {
-        let panorama = panorama(path, report)?;
+    pub(crate) fn encode_file(&self, path: &Path, layer: &Layer, report: Report) -> Result<Encoded> {
+        let panorama = panorama(path, layer, report)?;
         let grid = Equirect::new(GRID[0], GRID[1]);
         let item = Item::new(path, &panorama, grid);
         let encoded =

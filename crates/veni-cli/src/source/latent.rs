@@ -10,7 +10,8 @@ use veni_light::latent::Latent;
 use veni_light::model::Model;
 
 use super::model::{Loaded, embedded, model};
-use crate::args::ModelArgs;
+use super::remembered::is_of_its_pixels;
+use crate::args::{Layer, ModelArgs};
 use crate::output::{CUBE_FACES, LATENT, with_remedy};
 use crate::report::Report;
 
@@ -31,14 +32,32 @@ pub(crate) fn seeded(model: &Model, seed: u64) -> Latent {
     Latent { model: Some(model.hash()), ..Latent::from_seed(&model.prior(), seed) }
 }
 
-/// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder.
-pub(crate) fn from_file(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
+/// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder. An image whose
+/// pixels are no longer those of its latent is encoded.
+pub(crate) fn from_file(path: &Path, layer: &Layer, loaded: &Loaded, report: Report) -> Result<Latent> {
     let model = &loaded.model;
     let mut latent = match stored(path)? {
         Some(latent) => latent,
-        None => encode(path, loaded, report)?,
+        None => {
+            report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
+            encode(path, layer, loaded, report)?
+        }
     };
     check(&latent, loaded).with_context(|| path.display().to_string())?;
+    if !is_latent(path)? && !is_of_its_pixels(path, &latent, model)? {
+        if is_cube_map(path)? {
+            bail!(
+                "{}: a cube map whose pixels were changed after its latent was written, and cube maps cannot be encoded; \
+                 name the original, or an equirectangular panorama",
+                path.display()
+            );
+        }
+        report.note(format_args!(
+            "{}: its pixels were changed after its latent was written; encoding the panorama",
+            path.display()
+        ));
+        latent = encode(path, layer, loaded, report)?;
+    }
     if latent.model.is_none() {
         report.note(format_args!(
             "{}: does not say which model it belongs to; taken for this one",
@@ -100,9 +119,12 @@ fn inside(_: &Latent) -> Option<usize> {
     None
 }
 
-fn encode(path: &Path, loaded: &Loaded, report: Report) -> Result<Latent> {
-    report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
-    super::encoding::Encoding::new(loaded)?.encode_file(path, report).map(|e| e.latent)
+fn is_cube_map(path: &Path) -> Result<bool> {
+    Ok(veni_image::attributes(path).map_err(with_remedy)?.contains_key(CUBE_FACES))
+}
+
+fn encode(path: &Path, layer: &Layer, loaded: &Loaded, report: Report) -> Result<Latent> {
+    super::encoding::Encoding::new(loaded)?.encode_file(path, layer, report).map(|e| e.latent)
 }
 
 /// Whether a file is a latent, and not an image: JSON is a latent; everything else is left to the image readers, which say what

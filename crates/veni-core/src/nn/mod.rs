@@ -28,7 +28,7 @@ mod vn_relu;
 pub use attention::{VectorAttention, VectorAttentionConfig};
 pub use feed_forward::{GateWeights, VectorFeedForward, VectorFeedForwardConfig};
 pub use init::{normal, uniform};
-pub use norm::{coordinate_norm, guarded_coordinate_norm, squared_coordinate_norm};
+pub use norm::{coordinate_norm, squared_coordinate_norm};
 pub use so2_linear::{So2Linear, So2LinearConfig};
 pub use so2_relu::So2Relu;
 pub use transformer::{FoldedGates, VectorBlock, VectorTransformer, VectorTransformerConfig};

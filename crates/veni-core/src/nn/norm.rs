@@ -31,15 +31,6 @@ pub fn coordinate_norm(x: Tensor<4>) -> Tensor<4> {
     squared_coordinate_norm(x).clamp_min(SMALLEST_SQUARE).sqrt()
 }
 
-/// max(√(Σ x²), `least`) over the coordinates; below `least` the gradient is 0.
-///
-/// # Shapes
-/// - `x`: `[batch, token, coordinate, channel]`
-/// - output: `[batch, token, 1, channel]`
-pub fn guarded_coordinate_norm(x: Tensor<4>, least: f64) -> Tensor<4> {
-    squared_coordinate_norm(x).clamp_min((least * least).max(SMALLEST_SQUARE)).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,17 +51,5 @@ mod tests {
         for (g, e) in gradient.iter().zip(expected) {
             assert!((g - e).abs() < 1e-5, "{gradient:?}");
         }
-    }
-
-    #[test]
-    fn guard_cuts_value_and_gradient() {
-        let device = Device::flex().autodiff();
-        let x = Tensor::<4>::from_floats([[[[3e-7, 3.0], [4e-7, 4.0]]]], &device).require_grad();
-        let n = guarded_coordinate_norm(x.clone(), 1e-6);
-        let value: Vec<f32> = n.clone().try_into_vec_as().unwrap();
-        assert!((value[0] - 1e-6).abs() < 1e-12 && (value[1] - 5.0).abs() < 1e-6);
-        let gradient: Vec<f32> = x.grad(&n.sum().backward()).unwrap().try_into_vec_as().unwrap();
-        assert_eq!([gradient[0], gradient[2]], [0.0, 0.0]);
-        assert!((gradient[1] - 0.6).abs() < 1e-6 && (gradient[3] - 0.8).abs() < 1e-6);
     }
 }

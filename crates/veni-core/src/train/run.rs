@@ -192,7 +192,7 @@ impl Trainer {
                 "the loss is {value} at update {step}: lower the learning rates or the clipping norm"
             )));
         }
-        // schedules count from 0: with a warm-up the first update has rate 0, as the authors' has
+        // schedules count from 0: with a warm-up the first update has rate 0, as the reference's has
         let configured = stage.config.groups();
         let rates: Vec<_> = configured.iter().map(|(_, group)| group.learning_rate.at(local - 1)).collect();
         let groups = self.optimiser.update(&gradients, &rates);

@@ -207,11 +207,6 @@ impl FoldedEncoder {
     pub fn forward_per_image(&self, directions: Tensor<4>, log_radiance: Tensor<4>) -> Posterior {
         self.encoder.run(directions, log_radiance, Some(&self.gates))
     }
-
-    /// The encoder as it was.
-    pub fn unfold(self) -> Encoder {
-        self.encoder
-    }
 }
 
 /// The same directions for every image.

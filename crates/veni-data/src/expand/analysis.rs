@@ -21,7 +21,8 @@ impl Analysis {
     /// Finds the clipped regions and rebuilds partly clipped channels.
     pub fn new(ldr: &LdrPanorama, transfer: Transfer) -> Self {
         let grid = ldr.grid();
-        let mut linear = ldr.linear(transfer);
+        // each channel was clipped for itself, in the primaries of the file
+        let mut linear = ldr.linear_as_stored(transfer);
         let flags: Vec<[bool; 3]> = ldr.values().iter().map(|p| p.map(|v| v >= CLIPPED)).collect();
         let any: Vec<bool> = flags.iter().map(|f| f.contains(&true)).collect();
         let all: Vec<bool> = flags.iter().map(|f| !f.contains(&false)).collect();
@@ -29,10 +30,12 @@ impl Analysis {
             .fold(0.0, |sum, (k, _)| sum + grid.solid_angle(k / grid.width))
             / (4.0 * std::f64::consts::PI);
         if !any.contains(&true) {
+            ldr.to_rec709(&mut linear);
             return Self { linear, regions: vec![], labels: vec![], nearest: vec![], shape: vec![], clipped };
         }
         let angles = Angles::new(grid);
         channels::rebuild(&mut linear, &flags, &nearest_outside(&angles, &any));
+        ldr.to_rec709(&mut linear);
         let (labels, count) = label(grid, &all);
         let nearest = nearest_outside(&angles, &all);
         let (regions, shape) = describe(&angles, &linear, &labels, count, &nearest);

@@ -6,17 +6,17 @@ use std::sync::Arc;
 use super::Fingerprint;
 use crate::expand::network::{Estimate, Network, NetworkOptions};
 use crate::expand::{Expand, ExpandOptions, Sun};
+use crate::whole::{refuse_holes, whole};
 use crate::{Error, Result};
+use veni_image::limits::{EXAMINE_BYTES_PER_PIXEL, READ_BYTES_PER_PIXEL};
 use veni_image::tonemap::quantile;
-use veni_image::{LdrPanorama, Panorama, ReadOptions, Sanitised, luminance};
+use veni_image::{Content, LdrPanorama, Panorama, ReadOptions, Sanitised, luminance, memory};
 use veni_light::sphere::Equirect;
 
 /// More pixels than this that are not numbers, and a file counts as broken.
 const BROKEN: f64 = 0.05;
 /// More black pixels than this, and there is not enough left.
 const BLACK: f64 = 0.5;
-/// More pixels than this that alpha hides, and the panorama has holes.
-const TRANSPARENT: f64 = 0.01;
 /// Less between the darkest and the brightest value, as a factor, and there is nothing to see.
 const CONSTANT: f32 = 1.01;
 
@@ -66,6 +66,8 @@ pub struct Examined {
     pub stops: f32,
     /// What was done to an LDR file.
     pub expanded: Option<Expansion>,
+    /// What the file says that is not applied, or is worth knowing.
+    pub notes: Vec<String>,
 }
 
 /// Reads, checks and resamples a panorama: OpenEXR, Radiance, or an LDR format that is expanded.
@@ -73,7 +75,7 @@ pub struct Examined {
 /// # Errors
 /// Why the file is not fit: those of [`Panorama::read_with`] and [`LdrPanorama::read_with`]; [`Error::Invalid`]
 /// if it is smaller than asked, more than half black, has more than 5 % pixels that are not numbers or more than 1 %
-/// transparent ones, or one value throughout; [`Error::Unsupported`] for LDR files without `expand`; those of
+/// unknown ones (transparent, or outside of what the file holds), or one value throughout; [`Error::Unsupported`] for LDR files without `expand`; those of
 /// [`LdrPanorama::expand_by`].
 pub fn examine(path: &Path, config: &PrepareConfig) -> Result<Examined> {
     let (mut panorama, expanded) = read(path, config)?;
@@ -102,32 +104,36 @@ pub fn examine(path: &Path, config: &PrepareConfig) -> Result<Examined> {
             replaced,
             stops,
             expanded,
+            notes: panorama.notes().to_vec(),
         })
     };
     examined().map_err(|e| e.in_file(path))
 }
 
 fn read(path: &Path, config: &PrepareConfig) -> Result<(Panorama, Option<Expansion>)> {
-    if !LdrPanorama::recognise(path)? {
-        return Ok((Panorama::read_with(path, &config.read)?, None));
-    }
-    let Some(expander) = &config.expand else {
-        return Err(
-            Error::unsupported("holds no high dynamic range, and expansion is switched off").in_file(path)
-        );
+    let ldr = match Content::read(path, &config.read)? {
+        Content::Radiance(mut panorama) => {
+            whole(&mut panorama).map_err(|e| e.in_file(path))?;
+            return Ok((panorama, None));
+        }
+        Content::Display(ldr) => ldr,
     };
-    let ldr = LdrPanorama::read_with(path, &config.read)?;
-    if ldr.transparent() > TRANSPARENT {
-        let percent = 100.0 * ldr.transparent();
-        return Err(Error::invalid(format!("{percent:.0} % of it are transparent: fill the holes first"))
-            .in_file(path));
-    }
-    let (panorama, expansion) = expander.expand(&ldr).map_err(|e| e.in_file(path))?;
-    Ok((panorama, Some(expansion)))
+    let expanded = || -> Result<_> {
+        let Some(expander) = &config.expand else {
+            return Err(Error::unsupported("holds no high dynamic range, and expansion is switched off"));
+        };
+        refuse_holes(ldr.unknown())?;
+        let (mut panorama, expansion) = expander.expand(&ldr)?;
+        panorama.fill();
+        Ok((panorama, Some(expansion)))
+    };
+    expanded().map_err(|e| e.in_file(path))
 }
 
 impl Expander {
     fn expand(&self, ldr: &LdrPanorama) -> Result<(Panorama, Expansion)> {
+        // on top of what the display values take
+        memory::check(ldr.grid().len() as u64 * (EXAMINE_BYTES_PER_PIXEL - READ_BYTES_PER_PIXEL))?;
         match self {
             Self::Fitted(options) => {
                 let done = ldr.expand(options);
@@ -147,7 +153,8 @@ fn check_values(panorama: &Panorama) -> Result<()> {
     let count = panorama.pixels().len() as f64;
     let share =
         |f: &dyn Fn(&[f32; 3]) -> bool| panorama.pixels().iter().filter(|p| f(p)).count() as f64 / count;
-    let broken = share(&|p| p.iter().any(|v| !v.is_finite() || *v < -1.0));
+    let negative = -panorama.unit();
+    let broken = share(&|p| p.iter().any(|v| !v.is_finite() || *v < negative));
     if broken > BROKEN {
         return Err(Error::invalid(format!(
             "{:.0} % of its pixels are not numbers, infinite or negative",

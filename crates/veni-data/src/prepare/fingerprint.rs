@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use serde::{Deserialize, Serialize};
 
 use veni_image::tonemap::quantile;
-use veni_image::{LOG_FLOOR, Panorama, luminance};
+use veni_image::{Panorama, luminance};
 use veni_light::sphere::Equirect;
 
 /// The image that is looked at.
@@ -55,7 +55,8 @@ impl Fingerprint {
     /// The fingerprint of a clean panorama.
     pub fn new(panorama: &Panorama) -> Self {
         let small = panorama.resample(GRID);
-        let mut logs: Vec<f32> = small.pixels().iter().map(|p| (luminance(*p) + LOG_FLOOR).ln()).collect();
+        let floor = small.log_floor();
+        let mut logs: Vec<f32> = small.pixels().iter().map(|p| (luminance(*p) + floor).ln()).collect();
         let (low, high) = (quantile(&logs, 0.05), quantile(&logs, 0.9));
         logs.iter_mut().for_each(|v| *v = v.clamp(low, high));
         let weights: Vec<f64> = (0..GRID.height).map(|j| GRID.solid_angle(j)).collect();

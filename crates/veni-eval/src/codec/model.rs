@@ -6,7 +6,6 @@ use super::Codec;
 use crate::fitting::FitSettings;
 use crate::{Error, Result};
 use veni_core::LoadedModel;
-use veni_image::metrics::{Alignment, scores};
 use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
 
@@ -32,8 +31,8 @@ impl<'a> Autoencoder<'a> {
     }
 }
 
-/// A latent optimised for each image under the fixed decoder. The fit lowers log error, which may cost display error:
-/// where the encoder's latent has the higher LDR PSNR, it stays.
+/// A latent optimised for each image under the fixed decoder, as the fit leaves it. The loss is none of the scores that
+/// the tables report, so a score may fall where the loss falls.
 #[derive(Clone, Copy, Debug)]
 pub struct Optimised<'a> {
     subject: &'a LoadedModel,
@@ -46,12 +45,6 @@ impl<'a> Optimised<'a> {
     pub fn new(subject: &'a LoadedModel, settings: FitSettings) -> Self {
         let start = if subject.veni().is_some() { Start::Encoder } else { Start::Zero };
         Self { subject, settings, start }
-    }
-
-    /// LDR PSNR of one latent under exposure alignment.
-    fn display_score(&self, grid: Equirect, image: &[f32], latent: &[Latent]) -> Result<f64> {
-        let decoded = self.subject.decode(grid, latent)?.concat();
-        Ok(scores(&decoded, image, grid.height, grid.width, Alignment::Exposure).ldr_psnr)
     }
 }
 
@@ -104,7 +97,6 @@ impl Codec for Optimised<'_> {
             "pass": "optimised",
             "start": start,
             "fit": self.settings.key(),
-            "keeps": "the higher LDR PSNR",
         })
     }
 
@@ -114,10 +106,7 @@ impl Codec for Optimised<'_> {
             Start::Zero => vec![Latent::new(vec![[0.0; 3]; self.subject.latent_vectors()])],
         };
         let fitted = self.settings.fit(self.subject, grid, &[image], &start);
-        let fitted = fitted.map_err(|e| Error::invalid(format!("{}: {e}", self.subject.name())))?.latents;
-        let keep = self.start == Start::Encoder
-            && self.display_score(grid, image, &start)? > self.display_score(grid, image, &fitted)?;
-        Ok(numbers(if keep { start } else { fitted }))
+        Ok(numbers(fitted.map_err(|e| Error::invalid(format!("{}: {e}", self.subject.name())))?.latents))
     }
 
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>> {

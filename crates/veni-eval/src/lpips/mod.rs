@@ -52,7 +52,7 @@ struct Layer {
 impl Lpips {
     /// The weights in `files`: safetensors files or what `torch.save` writes, in either of its formats. AlexNet's features
     /// (torchvision's `features.N.weight`, or `net.sliceK.N.weight`) and the five heads (`linL.model.1.weight`) may be in
-    /// one file (torchmetrics, the authors' own checkpoints) or in two.
+    /// one file (torchmetrics, the reference implementation's checkpoints) or in two.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Invalid`] or [`Error::Unsupported`] naming the file and the tensor that is missing,

@@ -2,7 +2,7 @@
 //!
 //! | weight | accepted names (with anything and a dot before them) |
 //! |---|---|
-//! | convolution 0…4, [out, in, k, k] and [out] | `features.N.weight`, `features.N.bias` (torchvision's AlexNet, N = 0, 3, 6, 8, 10); `net.sliceK.N.…`, `sliceK.N.…` (`lpips`, torchmetrics, the authors' checkpoints; K = 1…5) |
+//! | convolution 0…4, [out, in, k, k] and [out] | `features.N.weight`, `features.N.bias` (torchvision's AlexNet, N = 0, 3, 6, 8, 10); `net.sliceK.N.…`, `sliceK.N.…` (`lpips`, torchmetrics, the reference's checkpoints; K = 1…5) |
 //! | head 0…4, [1, channels, 1, 1] | `linL.model.1.weight`, `lins.L.model.1.weight`, L = 0…4 |
 
 use std::path::{Path, PathBuf};

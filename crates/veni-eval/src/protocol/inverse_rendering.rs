@@ -27,7 +27,7 @@ use veni_image::metrics::{Alignment, psnr};
 use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
 
-/// Exponent of the highlight: the authors'.
+/// Exponent of the highlight: the reference's.
 const SHININESS: f32 = 500.0;
 /// Weight of the prior over latents.
 const PRIOR: f64 = 1e-4;

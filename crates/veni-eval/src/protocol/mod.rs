@@ -121,8 +121,7 @@ impl<'a> Evaluation<'a> {
     fn optimised_note(&self) -> String {
         let fit = FitSettings::thorough(self.data.grid(), self.settings.quick);
         format!(
-            "Optimised: {} from the encoder's latent (from 0 without encoder), solid-angle-weighted log error; where \
-             the encoder's latent has the higher LDR PSNR (exp.), it stays.",
+            "Optimised: {} from the encoder's latent (from 0 without encoder), solid-angle-weighted log error.",
             fit.describe()
         )
     }

@@ -16,6 +16,8 @@ use veni_light::model::{DecoderConfig, EncoderConfig, Model, ModelConfig, ModelI
 use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
+mod numbers;
+
 const GRID: Equirect = Equirect { width: 32, height: 16 };
 
 fn model(seed: u64) -> Model {
@@ -367,25 +369,26 @@ fn the_light_on_a_ball_is_found_from_the_picture_alone() {
     assert_eq!(first.figures.len(), 2);
 }
 
-/// A fit with steps so wide that it mostly makes things worse.
+/// Steps so wide that they make things worse: the optimised latent is judged as the fit leaves it.
 #[test]
-fn the_optimised_pass_never_scores_below_the_encoders() {
+fn the_optimised_pass_is_what_the_fit_ends_with() {
     let (subject, data) = (subject("a", 1), skies(6));
     let mut settings = FitSettings::thorough(GRID, true);
     settings.config.steps = 3;
     settings.config.learning_rate = veni_core::train::schedule::LearningRate::Constant { rate: 2.0 };
     let (first, second) = (Autoencoder::new(&subject).unwrap(), Optimised::new(&subject, settings));
-    let (mut kept, mut moved) = (0, 0);
+    let mut below = 0;
     for item in data.items() {
         let image = &item.log_radiance;
+        let start = subject.encode(GRID, &[image]).unwrap();
+        let fitted = settings.fit(&subject, GRID, &[image], &start).unwrap().latents;
         let codes = [&first as &dyn Codec, &second].map(|codec| codec.encode(GRID, image).unwrap());
-        let [before, after] = codes.each_ref().map(|code| {
-            let decoded = first.decode(GRID, code).unwrap();
+        assert_eq!(codes[1], fitted[0].vectors.concat());
+        let [before, after] = codes.map(|code| {
+            let decoded = first.decode(GRID, &code).unwrap();
             scores(&decoded, image, GRID.height, GRID.width, Alignment::Exposure).ldr_psnr
         });
-        assert!(after >= before, "{}: {before} became {after}", item.name());
-        if codes[0] == codes[1] { kept += 1 } else { moved += 1 }
+        below += usize::from(after < before);
     }
-    // the rule acts, and does not always
-    assert!(kept > 0, "{kept} kept, {moved} moved");
+    assert!(below > 0, "steps of 2 cost no panorama its score: nothing was tried");
 }

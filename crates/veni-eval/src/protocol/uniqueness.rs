@@ -1,6 +1,6 @@
 //! `uniqueness`: do two fits of one panorama, from two random starts, end in the same place of latent space?
 //!
-//! Per panorama two latents are fitted from N(0, 1) with the authors' helper (mean squared log error over all pixels alike;
+//! Per panorama two latents are fitted from N(0, 1) with the reference's helper (mean squared log error over all pixels;
 //! learning rate 1e-2 → 2e-3 for auto-encoders, 1e-1 → 1e-3 for auto-decoders). If both are the same code, or lie in one
 //! basin, the midpoint decodes to the same image: the measure is the mean squared difference of log radiance between the
 //! decoded first latent and the decoded midpoint ½(Z₁ + Z₂). Lower is better; the fits' own errors stand beside it.

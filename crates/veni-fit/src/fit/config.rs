@@ -35,7 +35,7 @@ pub struct FitConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Adam with β = (0.9, 0.999): the authors'. For every decoder and objective.
+    /// Adam with β = (0.9, 0.999): the reference's. For every decoder and objective.
     #[default]
     Adam,
     /// Gauss–Newton steps with a damping that adapts itself: no learning rate, and it ends by itself where the loss no
@@ -101,7 +101,7 @@ pub enum Objective {
         /// Part of the weight that goes by light, in [0, 1].
         share: f64,
     },
-    /// mean((m P − m I)²) over all pixels alike: the authors' helper.
+    /// mean((m P − m I)²) over all pixels alike: the reference's helper.
     ReferenceLogError,
     /// 1 − mean cos(P, I) + mean(R²) − mean(R)², R = P − I, over all pixels of all images alike (RENI++);
     /// with a free exposure, + mean(R²). It takes no mask.

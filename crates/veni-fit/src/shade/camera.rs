@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::vector::{Vector, add, cross, narrow, scale, sub, unit};
 use crate::{Error, Result};
 
-/// The horizontal field of view of the authors' renderings, radians (MODEL, Rendered images): 39.6°.
+/// The horizontal field of view of the reference's renderings, radians (MODEL, Rendered images): 39.6°.
 pub const REFERENCE_FIELD_OF_VIEW: f64 = 0.691_111_2;
 
 /// A pinhole camera with square pixels. Pixel (column i, row j) of W × H looks along

@@ -7,7 +7,7 @@ use super::vector::{Vector, add, cross, dot, narrow, scale, unit};
 /// The golden ratio: corners are (0, ±1, ±φ) and cyclic permutations, normalised.
 const PHI: f64 = 1.618_033_988_749_895;
 
-/// Corners, in the authors' order.
+/// Corners, in the reference's order.
 const CORNERS: [Vector; 12] = [
     [0.0, 1.0, PHI],
     [0.0, -1.0, PHI],
@@ -23,7 +23,7 @@ const CORNERS: [Vector; 12] = [
     [PHI, 0.0, -1.0],
 ];
 
-/// Faces, in the authors' order, which is that of the points inside them.
+/// Faces, in the reference's order, which is that of the points inside them.
 const FACES: [[usize; 3]; 20] = [
     [0, 5, 1],
     [0, 3, 5],

@@ -54,7 +54,7 @@ impl Lights {
     /// `at_least` of them (10 f² + 2), pushed out to the sphere. A vertex's solid angle is a third of that of the
     /// spherical triangles around it, so they add up to 4π. With `upper`, only those with z > 0 remain.
     ///
-    /// The order is that of the authors' `IcosahedronSampler`: the 12 corners, then along each of the 30 edges, then
+    /// The order is that of the reference's `IcosahedronSampler`: the 12 corners, then along each of the 30 edges, then
     /// inside each of the 20 faces.
     pub fn icosahedron(at_least: usize, upper: bool) -> Self {
         let vertices = icosahedron::vertices(at_least);

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use super::vector::{length, narrow, unit_f32, wide};
 use crate::{Error, Result};
-use veni_image::tonemap::srgb_to_linear;
-use veni_image::{LdrPanorama, Panorama, ReadOptions};
+use veni_image::{Content, Picture, ReadOptions};
 
 /// A normal counts if its length lies strictly between these (MODEL, Rendered images).
 const LENGTHS: [f64; 2] = [0.5, 1.5];
@@ -38,16 +37,21 @@ impl NormalMap {
     /// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is not such an image.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let (size, normals) = if let Some((size, pixels)) = display(path)? {
-            let decode = |[r, g, b, a]: [f32; 4]| {
-                let seen = a >= 0.5 && [r, g, b] != [0.0; 3];
-                if seen { [r, g, b].map(|v| 2.0 * v - 1.0) } else { [0.0; 3] }
-            };
-            (size, pixels.into_iter().map(decode).collect())
-        } else {
-            linear(path)?
+        let (grid, mut normals, known) = match Content::read(path, &data())? {
+            Content::Display(image) => {
+                let decode =
+                    |rgb: &[f32; 3]| if *rgb == [0.0; 3] { *rgb } else { rgb.map(|v| 2.0 * v - 1.0) };
+                let normals: Vec<_> = image.values().iter().map(decode).collect();
+                (image.grid(), normals, image.known().map(<[f32]>::to_vec))
+            }
+            Content::Radiance(image) => {
+                let known = image.known().map(<[f32]>::to_vec);
+                (image.grid(), image.into_pixels(), known)
+            }
         };
-        Self::new(size, normals).map_err(|e| e.in_file(path))
+        let hidden = known.iter().flatten().zip(&mut normals).filter(|(known, _)| **known < 0.5);
+        hidden.for_each(|(_, normal)| *normal = [0.0; 3]);
+        Self::new([grid.width, grid.height], normals).map_err(|e| e.in_file(path))
     }
 
     /// Columns and rows.
@@ -118,43 +122,25 @@ pub fn read_mask(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<bool>)> {
     Ok((size, mask.into_iter().map(|m| m >= 0.5).collect()))
 }
 
-/// Reads an albedo map as linear reflectance: EXR and Radiance as they stand, PNG through the sRGB curve. Returns [W, H]
-/// and the colours, row-major.
+/// Reads an albedo map as linear reflectance: colours as [`Content::read`] gives them, those of a display linearised as their
+/// file says. Returns [W, H] and the colours, row-major.
 ///
 /// # Errors
 /// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is not such an image.
 pub fn read_albedo(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<[f32; 3]>)> {
-    let path = path.as_ref();
-    if let Some((size, pixels)) = display(path)? {
-        return Ok((size, pixels.into_iter().map(|[r, g, b, _]| [r, g, b].map(srgb_to_linear)).collect()));
-    }
-    linear(path)
+    let picture = Picture::read_with(path, &ReadOptions { data: false, ..data() })?;
+    Ok((picture.size(), picture.pixels().to_vec()))
 }
 
-fn linear(path: &Path) -> Result<([usize; 2], Vec<[f32; 3]>)> {
-    let image = Panorama::read_with(path, &ReadOptions { any_aspect: true, ..ReadOptions::default() })?;
-    let grid = image.grid();
-    Ok(([grid.width, grid.height], image.into_pixels()))
-}
-
-/// Width and height, and the values of the pixels.
-type Rgba = ([usize; 2], Vec<[f32; 4]>);
-
-/// Values 0 to 1, not linearised: red, green, blue, alpha; where the file is one of display values.
-fn display(path: &Path) -> Result<Option<Rgba>> {
-    if !LdrPanorama::recognise(path)? {
-        return Ok(None);
-    }
-    let image = LdrPanorama::read_with(path, &ReadOptions { any_aspect: true, ..ReadOptions::default() })?;
-    let alpha = |p: usize| image.alpha().map_or(1.0, |alpha| alpha[p]);
-    let pixels = image.values().iter().enumerate().map(|(p, [r, g, b])| [*r, *g, *b, alpha(p)]).collect();
-    Ok(Some(([image.grid().width, image.grid().height], pixels)))
+/// Numbers as they are stored; nothing (0, 0, 0) where half or more is hidden.
+fn data() -> ReadOptions {
+    ReadOptions { any_aspect: true, data: true, place_parts: false, ..ReadOptions::default() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use veni_image::{Precision, WriteFormat, WriteOptions};
+    use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
     use veni_light::output::Overwrite;
     use veni_light::sphere::Equirect;
 
@@ -188,7 +174,6 @@ mod tests {
         let normals =
             vec![[0.0, 0.0, -1.0], [0.6, -0.8, 0.0], [0.0; 3], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]];
         let options = WriteOptions {
-            latlong: false,
             overwrite: Overwrite::Refuse,
             ..WriteOptions::new(WriteFormat::Exr(Precision::Float))
         };

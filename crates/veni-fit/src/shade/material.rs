@@ -169,12 +169,11 @@ impl Lobes {
         cosine * self.specular * (self.shininess * x.ln()).exp()
     }
 
-    /// n·h in single precision, step by step as in the reference implementation: with s = 500, the last bit of this
-    /// number is
-    /// 3e-5 of the result.
+    /// n·h in single precision, step by step as in the reference implementation, the order of its sums included: with
+    /// s = 500, the last bit of this number is 3e-5 of the result.
     fn reference_cosine(&self, light: Vector) -> f32 {
         let normalise = |v: [f32; 3]| {
-            let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+            let length = (v[0] * v[0] + (v[1] * v[1] + v[2] * v[2])).sqrt();
             v.map(|c| c / length.max(1e-12))
         };
         let (light, view, normal) = (normalise(narrow(light)), narrow(self.view), narrow(self.normal));

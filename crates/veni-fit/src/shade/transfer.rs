@@ -131,7 +131,8 @@ impl Transfer {
     }
 
     /// Whether the matrix is kept in memory, and not computed for every image.
-    pub fn is_stored(&self) -> bool {
+    #[cfg(test)]
+    pub(crate) fn is_stored(&self) -> bool {
         self.stored.is_some()
     }
 

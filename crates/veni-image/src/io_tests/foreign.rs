@@ -115,3 +115,96 @@ fn windows_channels_layers_and_primaries_of_other_software() {
     exr_file(&path, (16, 8), rgb(&image), plain, |_, own| own.environment_map = Some(EnvironmentMap::Cube));
     assert!(matches!(Panorama::read(&path), Err(Error::Unsupported(m)) if m.contains("cube")));
 }
+
+/// Halves are exact in every lossless compression; B44 and PXR24 keep what their definitions keep of them.
+#[test]
+fn halves_of_every_compression_come_back_to_the_bit() {
+    let dir = folder();
+    let path = dir.path().join("h.exr");
+    let image = sky(80, 40);
+    let half = |v: f32| f16::from_f32(v);
+    let channels = || -> Vec<(&'static str, FlatSamples)> {
+        let plane = |c: usize| FlatSamples::F16(plane(&image, c).into_iter().map(half).collect());
+        ["R", "G", "B"].into_iter().enumerate().map(|(c, name)| (name, plane(c))).collect()
+    };
+    let rounded: Vec<_> = image.pixels().iter().map(|p| p.map(|v| half(v).to_f32())).collect();
+    for compression in [
+        Compression::Uncompressed,
+        Compression::RLE,
+        Compression::ZIP1,
+        Compression::ZIP16,
+        Compression::PIZ,
+        Compression::PXR24,
+    ] {
+        for blocks in [Blocks::ScanLines, Blocks::Tiles(Vec2(32, 24))] {
+            let encoding = Encoding { compression, blocks, line_order: LineOrder::Increasing };
+            exr_file(&path, (80, 40), channels(), encoding, |_, _| ());
+            assert_eq!(Panorama::read(&path).unwrap().pixels(), rounded, "{compression:?}, {blocks:?}");
+        }
+    }
+}
+
+/// Of a file with smaller levels the largest is read.
+#[test]
+fn mip_levels_do_not_disturb() {
+    let dir = folder();
+    let path = dir.path().join("mip.exr");
+    let image = sky(32, 16);
+    let levels = |channel: usize| {
+        let plane = plane(&image, channel);
+        let level = |shift: usize| {
+            let (width, height) = ((32 >> shift).max(1), (16usize >> shift).max(1));
+            let at = |k: usize| plane[((k / width) << shift).min(15) * 32 + ((k % width) << shift).min(31)];
+            FlatSamples::F32(
+                (0..width * height).map(|k| if shift == 0 { plane[k] } else { 7.0 * at(k) }).collect(),
+            )
+        };
+        Levels::Mip { rounding_mode: exr::math::RoundingMode::Down, level_data: (0..6).map(level).collect() }
+    };
+    let list = [("B", 2), ("G", 1), ("R", 0)].map(|(name, c)| AnyChannel::new(name, levels(c)));
+    let encoding = Encoding { blocks: Blocks::Tiles(Vec2(16, 16)), ..Encoding::FAST_LOSSLESS };
+    let layer = Layer::new(
+        (32, 16),
+        LayerAttributes::default(),
+        encoding,
+        AnyChannels::sort(list.into_iter().collect()),
+    );
+    Image::from_layer(layer).write().to_file(&path).unwrap();
+    assert_eq!(Panorama::read(&path).unwrap().pixels(), image.pixels());
+}
+
+/// Two parts: each by its name, and the one that is called like a picture without.
+#[test]
+fn parts_are_layers() {
+    let dir = folder();
+    let path = dir.path().join("parts.exr");
+    let images =
+        [sky(16, 8), Panorama::from_fn(Equirect::new(16, 8), |[x, y, z]| [2.0 + x, 3.0 + y, 4.0 + z])];
+    let write = |names: [&str; 2]| {
+        let layer = |(image, name): (&Panorama, &str)| {
+            let channels = rgb(image).into_iter().map(|(n, s)| AnyChannel::new(n, s)).collect();
+            Layer::new(
+                (16, 8),
+                LayerAttributes::named(name),
+                Encoding::FAST_LOSSLESS,
+                AnyChannels::sort(channels),
+            )
+        };
+        let layers: Vec<_> = images.iter().zip(names).map(layer).collect();
+        let attributes = ImageAttributes::with_size((16, 8));
+        Image::from_layers(attributes, layers).write().to_file(&path).unwrap();
+    };
+    let named = |name: &str| ReadOptions { layer: Some(name.to_owned()), ..ReadOptions::default() };
+    write(["left", "right"]);
+    for (image, name) in images.iter().zip(["left", "right"]) {
+        assert_eq!(Panorama::read_with(&path, &named(name)).unwrap().pixels(), image.pixels(), "{name}");
+    }
+    let Err(Error::Layers { path: of, wanted, layers }) = Panorama::read(&path) else { panic!("two layers") };
+    assert_eq!((of, wanted, layers), (path.clone(), None, vec!["left".to_owned(), "right".to_owned()]));
+    let missing = Panorama::read_with(&path, &named("middle")).unwrap_err();
+    assert!(matches!(&missing, Error::Layers { wanted: Some(w), .. } if w == "middle"), "{missing}");
+    write(["albedo", "C"]);
+    assert_eq!(Panorama::read(&path).unwrap().pixels(), images[1].pixels());
+    write(["N", "radiance"]);
+    assert_eq!(Panorama::read(&path).unwrap().pixels(), images[1].pixels());
+}

@@ -1,7 +1,9 @@
 //! Files: round trips, files of other software's habits, poisoned files, random damage.
 
 mod foreign;
+mod metadata;
 mod poisoned;
+mod remembered;
 mod round_trips;
 
 use std::path::Path;

@@ -1,15 +1,8 @@
 //! Panoramas of limited range: PNG, JPEG, WebP and AVIF, as the display values that are stored.
 
-use std::io::{Read, Seek};
-use std::path::Path;
-
-use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
-
-use super::{LDR, ReadOptions, first_bytes, open, stands, unknown};
-use crate::panorama::Panorama;
+use super::meaning::{Curve, Meaning};
+use crate::panorama::{Panorama, unknown_share};
 use crate::tonemap::srgb_to_linear;
-use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 
 /// A panorama of limited dynamic range: display values in [0, 1], as an 8- or 16-bit file has them, row-major.
@@ -17,19 +10,21 @@ use veni_light::sphere::Equirect;
 /// veni-data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LdrPanorama {
-    grid: Equirect,
-    values: Vec<[f32; 3]>,
-    /// Of every pixel, 0 to 1, where the file hides any.
-    pub(super) alpha: Option<Vec<f32>>,
+    pub(super) grid: Equirect,
+    pub(crate) values: Vec<[f32; 3]>,
+    /// How much of every pixel is known, 0 to 1, where the file hides any.
+    pub(crate) known: Option<Vec<f32>>,
+    /// What the values mean.
+    pub(super) meaning: Meaning,
 }
 
 /// How display values become linear ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Transfer {
-    /// The sRGB curve (IEC 61966-2-1). The default.
+    /// As the file says; where it says nothing, by the sRGB curve (IEC 61966-2-1). The default.
     #[default]
     Srgb,
-    /// A power: v^γ.
+    /// A power, whatever the file says: v^γ.
     Gamma(f32),
 }
 
@@ -52,38 +47,7 @@ impl LdrPanorama {
         let Equirect { width, height } = grid;
         assert_eq!(values.len(), grid.len(), "a {width} × {height} panorama got {} pixels", values.len());
         let values = values.into_iter().map(|p| p.map(|v| v.clamp(0.0, 1.0))).collect();
-        Self { grid, values, alpha: None }
-    }
-
-    /// Whether the content of `path` is a format that [`LdrPanorama::read`] reads: a look at its first bytes.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if the file cannot be read, [`Error::Invalid`] for a folder.
-    pub fn recognise(path: impl AsRef<Path>) -> Result<bool> {
-        let path = path.as_ref();
-        let start = open(path).and_then(|mut file| first_bytes(&mut file, path));
-        start.map(|s| format(&s).is_some()).map_err(|e| e.in_file(path))
-    }
-
-    /// Reads a PNG, JPEG, WebP or (feature `avif`) AVIF file; see [`LdrPanorama::read_with`].
-    ///
-    /// # Errors
-    /// As [`LdrPanorama::read_with`].
-    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        Self::read_with(path, &ReadOptions::default())
-    }
-
-    /// Reads a PNG, JPEG or WebP file of 8 or 16 bits, or an AVIF file (feature `avif`) of 8 to 12, grey or coloured, turned
-    /// upright where its EXIF data says so (AVIF that is to be turned is refused); the content decides the format, not the
-    /// name. Alpha hides nothing (see [`LdrPanorama::transparent`]);
-    /// colour profiles are not applied: values are taken for Rec. 709 primaries.
-    ///
-    /// # Errors
-    /// [`Error::Unsupported`] for other formats; [`Error::Invalid`] for damaged files and for sizes that `options`
-    /// refuse, before pixels are allocated; [`Error::Io`] if the file cannot be read.
-    pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
-        let path = path.as_ref();
-        decode(path, options).map_err(|e| e.in_file(path))
+        Self { grid, values, known: None, meaning: Meaning::default() }
     }
 
     /// The pixel grid.
@@ -96,107 +60,71 @@ impl LdrPanorama {
         &self.values
     }
 
-    /// Share of the pixels (0 to 1) that the file's alpha channel hides by more than half; 0 without one.
-    pub fn transparent(&self) -> f64 {
-        let hidden = self.alpha.as_ref().map_or(0, |alpha| alpha.iter().filter(|a| **a < 0.5).count());
-        hidden as f64 / self.grid.len() as f64
+    /// Share of the pixels (0 to 1) of which less than half is known: transparent, or outside of the part that the file holds.
+    pub fn unknown(&self) -> f64 {
+        unknown_share(self.known.as_deref())
     }
 
-    /// The alpha channel, 0 to 1 for every pixel; `None` where there is none, or it hides nothing.
-    pub fn alpha(&self) -> Option<&[f32]> {
-        self.alpha.as_deref()
+    /// How much of every pixel is known, 0 to 1; `None` if all of all.
+    pub fn known(&self) -> Option<&[f32]> {
+        self.known.as_deref()
     }
 
-    /// Plain linearisation: white is radiance 1, and so is everything that was brighter.
+    /// What the file says that is not applied, or is worth knowing; sentences without the file's name.
+    pub fn notes(&self) -> &[String] {
+        &self.meaning.notes
+    }
+
+    /// Whether the values are coded by the sRGB curve with Rec. 709 primaries.
+    pub fn is_srgb(&self) -> bool {
+        self.meaning.curve == Curve::Srgb && self.meaning.matrix.is_none()
+    }
+
+    /// What the values are, in words: curve and primaries.
+    pub fn coding(&self) -> String {
+        let curve = match &self.meaning.curve {
+            Curve::Linear => "linear".to_owned(),
+            Curve::Srgb => "sRGB curve".to_owned(),
+            Curve::Power(gamma) => format!("power of {gamma:.3}"),
+            Curve::Pq => "PQ".to_owned(),
+            Curve::Hlg => "HLG".to_owned(),
+            Curve::Table(_) => "curve of an ICC profile".to_owned(),
+        };
+        let primaries = if self.meaning.matrix.is_some() {
+            "other primaries than Rec. 709"
+        } else {
+            "Rec. 709 primaries"
+        };
+        format!("{curve}, {primaries}")
+    }
+
+    /// The least linear value that `value` of any channel becomes.
+    pub(crate) fn linear_value(&self, value: f32) -> f32 {
+        (0..3).map(|channel| self.meaning.curve.linear(channel, value)).fold(f32::INFINITY, f32::min)
+    }
+
+    /// Plain linearisation, as the file says: white is radiance 1, and so is everything that was brighter.
     pub fn linear(&self, transfer: Transfer) -> Panorama {
-        Panorama::new(self.grid, self.values.iter().map(|p| p.map(|v| transfer.linear(v))).collect())
+        let mut panorama = self.linear_as_stored(transfer);
+        self.to_rec709(&mut panorama);
+        panorama
     }
-}
 
-/// The format that these first bytes begin, with its name.
-fn format(start: &[u8]) -> Option<(ImageFormat, &'static str)> {
-    let (.., format, name) = LDR.iter().find(|(at, magic, ..)| stands(start, *at, magic))?;
-    // RIFF holds sound and video too
-    let is_image = *format != ImageFormat::WebP || start.get(8..12) == Some(b"WEBP");
-    is_image.then_some((*format, *name))
-}
-
-fn decode(path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
-    let mut file = open(path)?;
-    let start = first_bytes(&mut file, path)?;
-    let Some((format, name)) = format(&start) else {
-        return Err(unknown(&start, "neither a PNG, a JPEG, a WebP nor an AVIF file"));
-    };
-    #[cfg(feature = "avif")]
-    if format == ImageFormat::Avif {
-        return super::avif::read(file, path, options);
+    /// [`LdrPanorama::linear`] in the primaries of the file, in which each channel was clipped for itself.
+    pub fn linear_as_stored(&self, transfer: Transfer) -> Panorama {
+        let mut panorama = Panorama::new(self.grid, self.values.clone());
+        let curve = match transfer {
+            Transfer::Srgb => &self.meaning.curve,
+            Transfer::Gamma(gamma) => &Curve::Power(gamma),
+        };
+        self.meaning.linearise(curve, panorama.pixels_mut());
+        panorama.known.clone_from(&self.known);
+        panorama.notes.clone_from(&self.meaning.notes);
+        panorama
     }
-    let wrap = |error: ImageError| match error {
-        ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
-            Error::invalid(format!("truncated {name} file"))
-        }
-        ImageError::IoError(e) if e.raw_os_error().is_some() => Error::io(path, "read", e),
-        ImageError::Unsupported(e) => Error::unsupported(format!("{name}: {e}")),
-        other => Error::invalid(format!("damaged or truncated {name} file: {other}")),
-    };
-    if format == ImageFormat::Jpeg && !jpeg_ends(&mut file).map_err(|e| Error::io(path, "read", e))? {
-        return Err(Error::invalid("truncated JPEG file"));
-    }
-    let mut reader = ImageReader::with_format(file, format);
-    let mut limits = Limits::default();
-    // 8 bytes of the largest sample layout per pixel, and as much again for a decoder's own buffers
-    limits.max_alloc = Some(options.max_pixels.saturating_mul(16) as u64);
-    reader.limits(limits);
-    let mut decoder = reader.into_decoder().map_err(wrap)?;
-    let orientation = decoder.orientation().map_err(wrap)?;
-    let (width, height) = decoder.dimensions();
-    let (width, height) = if on_its_side(orientation) { (height, width) } else { (width, height) };
-    let grid = options.check(width as usize, height as usize)?;
-    let mut image = DynamicImage::from_decoder(decoder).map_err(wrap)?;
-    image.apply_orientation(orientation);
-    Ok(values(grid, &image))
-}
 
-/// Whether a JPEG stream has an end marker behind the start of its first scan; the decoder paints what is missing grey.
-/// Rewinds.
-fn jpeg_ends(file: &mut (impl Read + Seek)) -> std::io::Result<bool> {
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes)?;
-    file.rewind()?;
-    // segments before the scan are stepped over: thumbnails in them have an end of their own
-    let mut at = 2;
-    while let Some(&[0xFF, marker, high, low]) = bytes.get(at..at + 4) {
-        if marker == 0xDA {
-            return Ok(bytes[at..].windows(2).any(|pair| pair == [0xFF, 0xD9]));
-        }
-        at += 2 + usize::from(u16::from_be_bytes([high, low]));
+    /// From the primaries of the file to Rec. 709.
+    pub fn to_rec709(&self, panorama: &mut Panorama) {
+        self.meaning.to_rec709(panorama.pixels_mut());
     }
-    // fill bytes or no scan at all: for the decoder to judge
-    Ok(true)
-}
-
-/// Whether turning the image upright exchanges its sides.
-fn on_its_side(orientation: Orientation) -> bool {
-    use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
-    matches!(orientation, Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH)
-}
-
-/// Display values of any sample layout, and their alpha.
-fn values(grid: Equirect, image: &DynamicImage) -> LdrPanorama {
-    let mut values = Vec::with_capacity(grid.len());
-    let mut alpha = None;
-    match image {
-        DynamicImage::ImageRgb8(rgb) => {
-            values.extend(rgb.pixels().map(|p| p.0.map(|v| f32::from(v) / 255.0)));
-        }
-        other => {
-            let rgba = other.to_rgba16();
-            let unit = |v: u16| f32::from(v) / 65535.0;
-            values.extend(rgba.pixels().map(|p| [p.0[0], p.0[1], p.0[2]].map(unit)));
-            if rgba.pixels().any(|p| p.0[3] < u16::MAX) {
-                alpha = Some(rgba.pixels().map(|p| unit(p.0[3])).collect());
-            }
-        }
-    }
-    LdrPanorama { grid, values, alpha }
 }

@@ -26,7 +26,7 @@ fn sample_layouts_of_png_jpeg_and_webp() {
         let (_folder, path) = write(&gradient().into(), "misnamed.exr", format);
         assert!(LdrPanorama::recognise(&path).unwrap());
         let ldr = LdrPanorama::read(&path).unwrap();
-        assert_eq!((ldr.grid(), ldr.transparent()), (Equirect::new(8, 4), 0.0));
+        assert_eq!((ldr.grid(), ldr.unknown()), (Equirect::new(8, 4), 0.0));
         for (k, value) in ldr.values().iter().enumerate() {
             let off = value.iter().zip(expected(k)).map(|(a, b)| (a - b).abs()).fold(0f32, f32::max);
             assert!(off <= tolerance, "{format:?}, pixel {k}: {value:?}");
@@ -44,10 +44,10 @@ fn sample_layouts_of_png_jpeg_and_webp() {
     let half = ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, _| LumaA([51, if x < 2 { 0 } else { 255 }]));
     let (_folder, path) = write(&DynamicImage::ImageLumaA8(half), "half.png", ImageFormat::Png);
     let ldr = LdrPanorama::read(&path).unwrap();
-    assert_eq!((ldr.values()[0], ldr.transparent()), ([0.2; 3], 0.25));
+    assert_eq!((ldr.values()[0], ldr.unknown()), ([0.2; 3], 0.25));
     let clear = DynamicImage::ImageRgba8(ImageBuffer::from_pixel(SIZE.0, SIZE.1, Rgba([255, 0, 0, 127])));
     let (_folder, path) = write(&clear, "clear.webp", ImageFormat::WebP);
-    assert_eq!(LdrPanorama::read(&path).unwrap().transparent(), 1.0);
+    assert_eq!(LdrPanorama::read(&path).unwrap().unknown(), 1.0);
     // radiance only where the file holds it
     let error = Panorama::read(&path).unwrap_err().to_string();
     assert!(error.contains("WebP") && error.contains("expand"), "{error}");

@@ -2,28 +2,43 @@
 
 #[cfg(feature = "avif")]
 mod avif;
+mod content;
+mod decode;
+mod display;
+mod exif;
 mod exr;
+mod gain_map;
+mod gpano;
 mod hdr;
+mod icc;
+mod jpeg;
 mod ldr;
 #[cfg(test)]
 mod ldr_tests;
+mod meaning;
+mod metadata;
+mod png;
+mod precheck;
+mod spaces;
+mod xmp;
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
 use image::ImageFormat;
 
+use crate::limits::{EXAMINE_BYTES_PER_PIXEL, READ_BYTES_PER_PIXEL};
 use crate::panorama::Panorama;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 
+pub use content::Content;
 pub use ldr::{LdrPanorama, Transfer};
+pub use metadata::{METADATA, Metadata, Treatment};
 
-/// The largest panorama that [`Panorama::read`] accepts: 2²⁸ pixels (a little over 23,000 × 11,500), which is
-/// 3 GiB of radiance. [`ReadOptions::max_pixels`] overrides it.
-pub const DEFAULT_MAX_PIXELS: usize = 1 << 28;
+pub use crate::limits::DEFAULT_MAX_PIXELS;
 
 /// What [`Panorama::read_with`] accepts.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,11 +49,22 @@ pub struct ReadOptions {
     pub any_aspect: bool,
     /// Which EXR layer to read, for files with several ("ViewLayer.Combined" for channels "ViewLayer.Combined.R" …).
     pub layer: Option<String>,
+    /// The numbers are no colours (normals, masks): they are given as stored, whatever the file says of colours.
+    pub data: bool,
+    /// A picture that its file calls a part of a panorama (GPano) is placed in its full sphere, the rest unknown; otherwise it
+    /// is given as it is.
+    pub place_parts: bool,
 }
 
 impl Default for ReadOptions {
     fn default() -> Self {
-        Self { max_pixels: DEFAULT_MAX_PIXELS, any_aspect: false, layer: None }
+        Self {
+            max_pixels: DEFAULT_MAX_PIXELS,
+            any_aspect: false,
+            layer: None,
+            data: false,
+            place_parts: true,
+        }
     }
 }
 
@@ -73,54 +99,31 @@ impl Panorama {
         Self::read_with(path, &ReadOptions::default())
     }
 
-    /// Reads an OpenEXR or Radiance `.hdr` panorama. Values are as stored (possibly not finite:
-    /// [`Panorama::sanitise`]), brought to Rec. 709 primaries where the file names others.
+    /// Reads an OpenEXR or Radiance `.hdr` panorama, or another file of high dynamic range (PNG or AVIF coded by PQ or HLG, a
+    /// JPEG with a gain map). Values are as stored (possibly not finite: [`Panorama::sanitise`]) but for what the file says of
+    /// them ([`METADATA`]); they are linear with Rec. 709 primaries.
     ///
     /// - OpenEXR: every compression and sample type of the `exr` crate, scan lines or tiles, the largest level
     ///   of multi-resolution files. The panorama is the display window; where the data window leaves some of it
-    ///   uncovered the pixels are black, as OpenEXR defines, and what lies outside is cut off. Colour channels
-    ///   are R, G, B or, failing that, Y alone as grey; alpha is ignored. A factor that [`HalfRange::Fit`]
-    ///   recorded in the file is divided out again.
-    /// - Radiance: values are divided by the product of the EXPOSURE lines, as that format asks.
+    ///   uncovered it is [unknown](Panorama::known), and what lies outside is cut off. Colour channels
+    ///   are R, G, B or, failing that, Y alone as grey, divided by alpha; what is transparent is unknown. A factor that
+    ///   [`HalfRange::Fit`] recorded in the file is divided out again.
+    /// - Radiance: values are divided by the product of the EXPOSURE lines, as that format asks. All eight orientations.
     ///
     /// [`HalfRange::Fit`]: super::HalfRange::Fit
     ///
     /// # Errors
-    /// [`Error::LowRange`] for formats with a limited range (PNG, JPEG, …); [`Error::Unsupported`] for cube maps, deep, subsampled or
-    /// XYZ-coded images; [`Error::Invalid`] for damaged files and for sizes that `options` refuse;
+    /// [`Error::LowRange`] for files of limited range (PNG, JPEG, …); [`Error::Unsupported`] for cube maps, deep or subsampled
+    /// images and for colours that are not read; [`Error::Layers`] if several layers could be meant; [`Error::Invalid`] for damaged files and for sizes that `options` refuse;
     /// [`Error::Io`] if the file cannot be read.
     pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
         let path = path.as_ref();
-        let read = || -> Result<Self> {
-            let mut file = open(path)?;
-            match kind(&mut file, path)? {
-                Kind::Exr => exr::read(file, path, options),
-                Kind::Hdr { strict } => hdr::read(file, path, strict, options),
-            }
-        };
-        read().map_err(|e| e.in_file(path))
-    }
-
-    /// The alpha channel of the pixels that [`Panorama::read_with`] gives, row-major, 0 where an EXR file's data
-    /// window leaves the panorama uncovered; nothing for files without one, Radiance files among them.
-    ///
-    /// # Errors
-    /// As [`Panorama::read_with`].
-    pub fn read_alpha(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Option<Vec<f32>>> {
-        let path = path.as_ref();
-        let read = || {
-            let mut file = open(path)?;
-            match kind(&mut file, path)? {
-                Kind::Exr => exr::read_alpha(file, path, options),
-                Kind::Hdr { .. } => Ok(None),
-            }
-        };
-        read().map_err(|e| e.in_file(path))
+        content::radiance(path, options).map_err(|e| e.in_file(path))
     }
 }
 
 /// The text attributes of an EXR file, from its header alone (no pixel is read); those of the first part where
-/// parts disagree. A Radiance file gives its `NAME=value` header lines.
+/// parts disagree. A Radiance file gives its `NAME=value` header lines, PNG, JPEG, WebP and AVIF give nothing.
 ///
 /// # Errors
 /// As [`Panorama::read_with`] where the header is concerned.
@@ -130,10 +133,47 @@ pub fn attributes(path: impl AsRef<Path>) -> Result<BTreeMap<String, String>> {
         let mut file = open(path)?;
         match kind(&mut file, path)? {
             Kind::Exr => exr::attributes(file, path),
-            Kind::Hdr { strict } => hdr::attributes(file, path, strict),
+            Kind::Hdr => hdr::attributes(file, path),
+            Kind::Display(_) => Ok(BTreeMap::new()),
         }
     };
     read().map_err(|e| e.in_file(path))
+}
+
+/// Bytes of memory that reading, expanding and examining a file takes at its peak, by the size that its header declares; no
+/// pixel is read. Nothing where it declares none, or more pixels than `options` allow: to read it is an error.
+///
+/// # Errors
+/// As [`Panorama::read_with`] and [`LdrPanorama::read_with`] where the header is concerned.
+pub fn peak_bytes(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Option<u64>> {
+    let path = path.as_ref();
+    let look = || {
+        let mut file = open(path)?;
+        let start = first_bytes(&mut file, path)?;
+        // radiance is not expanded
+        let each = if format(&start).is_some() { EXAMINE_BYTES_PER_PIXEL } else { READ_BYTES_PER_PIXEL };
+        Ok(precheck::peak(declared(&mut file, path)?, each, options))
+    };
+    look().map_err(|e: Error| e.in_file(path))
+}
+
+/// The size that the header of a file of any format declares; rewinds.
+fn declared(file: &mut (impl BufRead + Seek), path: &Path) -> Result<precheck::Size> {
+    let start = first_bytes(file, path)?;
+    let Some((format, _)) = format(&start) else {
+        return match kind(file, path)? {
+            Kind::Exr => precheck::exr(file, path),
+            Kind::Hdr => precheck::hdr(file, path),
+            Kind::Display(_) => Ok(None),
+        };
+    };
+    #[cfg(feature = "avif")]
+    if format == ImageFormat::Avif {
+        let size = avif::declared(&mut *file, path)?;
+        file.rewind().map_err(|e| Error::io(path, "read", e))?;
+        return Ok(Some(size));
+    }
+    precheck::ldr(file, path, format)
 }
 
 fn open(path: &Path) -> Result<BufReader<File>> {
@@ -146,7 +186,9 @@ fn open(path: &Path) -> Result<BufReader<File>> {
 
 enum Kind {
     Exr,
-    Hdr { strict: bool },
+    Hdr,
+    /// Of limited range as a rule.
+    Display(&'static str),
 }
 
 /// Formats of limited range that [`LdrPanorama::read`] reads: where the name of each stands.
@@ -157,6 +199,14 @@ const LDR: &[(usize, &[u8], ImageFormat, &str)] = &[
     #[cfg(feature = "avif")]
     (4, b"ftypavif", ImageFormat::Avif, "AVIF"),
 ];
+
+/// The format that these first bytes begin, with its name.
+fn format(start: &[u8]) -> Option<(ImageFormat, &'static str)> {
+    let (.., format, name) = LDR.iter().find(|(at, magic, ..)| stands(start, *at, magic))?;
+    // RIFF holds sound and video too
+    let is_image = *format != ImageFormat::WebP || start.get(8..12) == Some(b"WEBP");
+    is_image.then_some((*format, *name))
+}
 
 /// Formats that are not read: where the name of each stands.
 const FOREIGN: [(usize, &[u8], &str); 7] = [
@@ -178,17 +228,19 @@ fn first_bytes(file: &mut (impl Read + Seek), path: &Path) -> Result<Vec<u8>> {
     Ok(start)
 }
 
-/// Recognises a format that holds radiance and rewinds.
+/// Recognises a format and rewinds.
 fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
     let start = first_bytes(file, path)?;
     if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        precheck::exr(file, path)?;
         return Ok(Kind::Exr);
     }
     if start.starts_with(b"#?") {
-        return Ok(Kind::Hdr { strict: start.starts_with(b"#?RADIANCE") });
+        precheck::hdr(file, path)?;
+        return Ok(Kind::Hdr);
     }
-    if let Some((.., format)) = LDR.iter().find(|(at, magic, ..)| stands(&start, *at, magic)) {
-        return Err(Error::LowRange { path: path.to_path_buf(), format });
+    if let Some((_, format)) = format(&start) {
+        return Ok(Kind::Display(format));
     }
     Err(unknown(&start, "neither an OpenEXR nor a Radiance .hdr file"))
 }

@@ -7,7 +7,7 @@ mod srgb;
 
 pub use srgb::{srgb, srgb_of_log, srgb_slope, srgb_to_linear};
 
-use super::{LOG_FLOOR, Panorama};
+use super::Panorama;
 
 /// The quantile that [`Tonemap::reference`] shows as white.
 pub const REFERENCE_QUANTILE: f64 = 0.98;
@@ -44,7 +44,7 @@ impl Tonemap {
     /// Filmic with automatic exposure: the solid-angle-weighted geometric mean luminance becomes middle grey,
     /// then `stops` more (a factor of 2 each).
     pub fn filmic(image: &Panorama, stops: f32) -> Self {
-        let mean = image.mean_log_luminance().exp().max(LOG_FLOOR);
+        let mean = image.mean_log_luminance().exp().max(f32::MIN_POSITIVE);
         Self { scale: MIDDLE_GREY / mean * stops.exp2(), curve: Curve::Filmic }
     }
 

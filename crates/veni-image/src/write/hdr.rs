@@ -1,12 +1,16 @@
 //! Radiance RGBE with the run-length code of its second version, row by row.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
-use super::{Accept, SOFTWARE, WriteOptions};
+use super::{Accept, SOFTWARE, WriteOptions, texts};
+use crate::provenance::{Digest, PIXEL_DIGEST};
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
+
+/// The longest header line: three.js before its revision 184 reads no more than 127 bytes of one, FreeImage 255.
+const MAX_LINE: usize = 99;
 
 /// Row widths that the run-length code can express; others are stored flat.
 const RLE_WIDTHS: std::ops::RangeInclusive<usize> = 8..=0x7fff;
@@ -19,8 +23,13 @@ pub(super) fn write(
     run: impl FnOnce(Accept<'_>) -> Result<()>,
 ) -> Result<()> {
     let io = |e| Error::io(path, "write", e);
-    let mut header = format!("#?RADIANCE\nSOFTWARE={SOFTWARE}\n");
-    for (name, value) in &options.attributes {
+    // some readers take the format for the first line of the header
+    let mut header = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nSOFTWARE={SOFTWARE}\n");
+    let mut digest = None;
+    for (name, value) in texts(options, 1.0, |name| MAX_LINE.saturating_sub(name.len() + 1))? {
+        if name == PIXEL_DIGEST {
+            digest = Some((Digest::new(grid), header.len() + name.len() + 1));
+        }
         if name.is_empty()
             || name.starts_with('#')
             || name.contains(['=', '\n', '\r'])
@@ -33,13 +42,14 @@ pub(super) fn write(
         header.push_str(&format!("{name}={value}\n"));
     }
     let Equirect { width, height } = grid;
-    header.push_str(&format!("FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"));
+    header.push_str(&format!("\n-Y {height} +X {width}\n"));
     file.write_all(header.as_bytes()).map_err(io)?;
     let (mut row, mut bytes) = (0, Vec::new());
     run(&mut |rows| {
         for pixels in rows.chunks_exact(width) {
             bytes.clear();
-            encode_row(pixels, &mut bytes).map_err(|column| {
+            let digest = digest.as_mut().map(|(digest, _)| digest);
+            encode_row(pixels, &mut bytes, digest).map_err(|column| {
                 let pixel = pixels[column];
                 Error::invalid(format!(
                     "pixel ({column}, {row}) is {pixel:?}; Radiance holds 0 to 1.7e38 only"
@@ -49,14 +59,20 @@ pub(super) fn write(
             row += 1;
         }
         Ok(())
-    })
+    })?;
+    let Some((digest, at)) = digest else { return Ok(()) };
+    let put = file.seek(SeekFrom::Start(at as u64)).and_then(|_| file.write_all(digest.finish().as_bytes()));
+    put.map_err(io)
 }
 
-/// One row; the column of a pixel that RGBE cannot hold otherwise.
-fn encode_row(pixels: &[[f32; 3]], out: &mut Vec<u8>) -> Result<(), usize> {
+/// One row, which the digest sees as it is read; the column of a pixel that RGBE cannot hold otherwise.
+fn encode_row(pixels: &[[f32; 3]], out: &mut Vec<u8>, digest: Option<&mut Digest>) -> Result<(), usize> {
     let mut rgbe = Vec::with_capacity(pixels.len());
     for (column, &pixel) in pixels.iter().enumerate() {
         rgbe.push(encode(pixel).ok_or(column)?);
+    }
+    if let Some(digest) = digest {
+        digest.update(&rgbe.iter().map(|pixel| decode(*pixel)).collect::<Vec<_>>());
     }
     if !RLE_WIDTHS.contains(&pixels.len()) {
         out.extend_from_slice(rgbe.as_flattened());
@@ -93,6 +109,12 @@ fn encode(pixel: [f32; 3]) -> Option<[u8; 4]> {
     let scale = f64::from(8 - e).exp2();
     let [r, g, b] = pixel.map(|v| (f64::from(v) * scale).round() as u8);
     Some([r, g, b, (e + 128) as u8])
+}
+
+/// What readers make of a pixel.
+fn decode([r, g, b, e]: [u8; 4]) -> [f32; 3] {
+    let scale = f32::exp2(f32::from(e) - 136.0);
+    [r, g, b].map(|v| f32::from(v) * scale)
 }
 
 /// Runs of four or more equal bytes as (128 + length, byte), the rest as (length, bytes …), 127 and 128 at most.

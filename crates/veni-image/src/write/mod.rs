@@ -2,6 +2,7 @@
 //! Every file is written beside its target, synced and renamed ([`veni_light::output`]).
 
 mod exr;
+mod half_range;
 mod hdr;
 mod png;
 
@@ -9,7 +10,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::tonemap::Tonemap;
+use crate::numbered;
 use crate::panorama::Panorama;
+use crate::provenance::{Digest, PIXEL_DIGEST};
 use crate::{Error, Result};
 use veni_light::output::{Overwrite, write_atomic};
 use veni_light::sphere::Equirect;
@@ -18,36 +21,47 @@ use veni_light::sphere::Equirect;
 /// half precision; [`Panorama::read`] divides by it again.
 pub const RADIANCE_SCALE: &str = "veni:radianceScale";
 
+pub use half_range::{HALF_ERROR, HALF_RANGE, HalfRange, half_error};
+
 /// The `software` that written files name.
 const SOFTWARE: &str = concat!("veni ", env!("CARGO_PKG_VERSION"));
+
+/// Attributes whose values are written already.
+const RESERVED: [&str; 3] = [RADIANCE_SCALE, PIXEL_DIGEST, exr::COLOUR_SPACE];
+
+/// The attributes of `options` in parts of at most `room(name)` bytes, and where there are any, or `factor` changes the
+/// values, room for the digest of the pixels.
+fn texts(options: &WriteOptions, factor: f32, room: impl Fn(&str) -> usize) -> Result<Vec<(String, String)>> {
+    let mut all = options.attributes.clone();
+    if let Some(name) = all.keys().find(|name| RESERVED.contains(&name.as_str())) {
+        return Err(Error::invalid(format!(
+            "the attribute {name} is not free: it is written with what it says of the values"
+        )));
+    }
+    if factor != 1.0 {
+        all.insert(RADIANCE_SCALE.to_owned(), factor.to_string());
+    }
+    if !all.is_empty() {
+        all.insert(PIXEL_DIGEST.to_owned(), Digest::BLANK.to_owned());
+    }
+    numbered::split(&all, room)
+}
 
 /// Bits of an EXR sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Precision {
-    /// 16-bit floats: 11 significant bits, up to 65504.
+    /// 16-bit floats: 11 significant bits from 6.1e-5 to 65504, fewer below.
     #[default]
     Half,
     /// 32-bit floats.
     Float,
 }
 
-/// What happens to values beyond the range of half precision. They never become infinite.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum HalfRange {
-    /// Refuse to write the file.
-    #[default]
-    Refuse,
-    /// Multiply all values by the largest power of two that brings the brightest into range, and record it as
-    /// [`RADIANCE_SCALE`]. Only for whole panoramas: [`write_rows`] cannot know the brightest beforehand.
-    Fit,
-    /// Multiply all values by this factor and record it; what is still out of range is refused.
-    Factor(f32),
-}
-
 /// The format of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WriteFormat {
-    /// OpenEXR: scan lines in increasing order, ZIP, `envmap = latlong`, Rec. 709 chromaticities.
+    /// OpenEXR: scan lines in increasing order, ZIP, Rec. 709 chromaticities. There is no `envmap`: by `latlong` OpenEXR
+    /// means samples that lie on the edges of the image, ours are at the centres of pixels.
     Exr(Precision),
     /// Radiance RGBE with run-length coding: 8 significant bits, shared exponent.
     Hdr,
@@ -81,13 +95,18 @@ pub struct WriteOptions {
     pub format: WriteFormat,
     /// Half-precision EXR only.
     pub half_range: HalfRange,
-    /// Text attributes for EXR files, `NAME=value` header lines for `.hdr`, text chunks for PNG.
+    /// Text attributes for EXR files, `NAME=value` header lines for `.hdr`, text chunks for PNG. Beside them EXR and
+    /// `.hdr` files record a digest of the pixels ([`PIXEL_DIGEST`]). Long values take several attributes, numbered
+    /// `NAME[1/3]`, since other software reads no more than 255 bytes of one and no lines of more than 127; reading puts
+    /// them together.
+    ///
+    /// [`PIXEL_DIGEST`]: crate::PIXEL_DIGEST
     pub attributes: BTreeMap<String, String>,
     /// Whether an existing file may be replaced.
     pub overwrite: Overwrite,
-    /// Whether the rows are a latitude–longitude panorama, as an EXR file then says; otherwise (cube faces, charts)
-    /// it says nothing about directions.
-    pub latlong: bool,
+    /// Whether the values are colours (linear Rec. 709, as an EXR file then says); otherwise they are numbers of another
+    /// kind, such as normals.
+    pub colour: bool,
 }
 
 impl WriteOptions {
@@ -98,7 +117,7 @@ impl WriteOptions {
             half_range: HalfRange::Refuse,
             attributes: BTreeMap::new(),
             overwrite: Overwrite::Refuse,
-            latlong: true,
+            colour: true,
         }
     }
 }
@@ -111,10 +130,7 @@ impl Panorama {
     pub fn write(&self, path: impl AsRef<Path>, options: &WriteOptions) -> Result<()> {
         let mut options = options.clone();
         if options.half_range == HalfRange::Fit {
-            let brightest = self.pixels.as_flattened().iter().fold(0f32, |a, b| a.max(b.abs()));
-            let halvings = (f64::from(brightest) / exr::HALF_MAX).log2().ceil().max(0.0);
-            let factor = (-halvings).exp2() as f32;
-            options.half_range = if factor < 1.0 { HalfRange::Factor(factor) } else { HalfRange::Refuse };
+            options.half_range = HalfRange::Factor(half_range::fit(&self.pixels));
         }
         write_rows(path, self.grid, &options, |sink| sink.push(&self.pixels))
     }

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
+use super::Field;
 use super::aligned::Aligned;
 use super::block::Blocks;
 use super::single::Single;
-use super::{Field, tasks};
 use crate::sphere::Equirect;
+use crate::tasks;
 
 /// So many directions are faster one by one than as a block with idle lanes.
 const FEW: usize = 6;

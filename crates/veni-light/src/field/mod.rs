@@ -26,7 +26,6 @@ mod math;
 mod mlp;
 mod rate;
 mod single;
-pub(crate) mod tasks;
 mod weights;
 
 use std::sync::Arc;

@@ -37,7 +37,7 @@ pub fn multiply_add_rate() -> f64 {
 /// Runs this many rounds on every thread: the time until the last is done, and floating-point operations of all.
 fn timed(rounds: usize) -> (Duration, f64) {
     let started = Instant::now();
-    let lanes = super::tasks::on_every_thread(|| pulp::Arch::new().dispatch(Chains { rounds }));
+    let lanes = crate::tasks::on_every_thread(|| pulp::Arch::new().dispatch(Chains { rounds }));
     let time = started.elapsed();
     (time, (lanes.iter().sum::<usize>() * rounds * STEPS * CHAINS * 2) as f64)
 }
@@ -83,7 +83,7 @@ mod tests {
     /// two for every lane of every thread.
     #[test]
     fn every_operation_that_is_counted_is_done() {
-        let lanes = crate::field::tasks::on_every_thread(|| pulp::Arch::new().dispatch(Chains { rounds: 1 }));
+        let lanes = crate::tasks::on_every_thread(|| pulp::Arch::new().dispatch(Chains { rounds: 1 }));
         let [(_, once), (_, often)] = [1, 1000].map(timed);
         assert_eq!(once, (lanes.iter().sum::<usize>() * 2 * 8 * 12) as f64);
         assert_eq!(often, 1000.0 * once);
@@ -105,7 +105,7 @@ mod tests {
             f64::from(2 * count) / started.elapsed().as_secs_f64()
         });
         let plain = plain.fold(0.0, f64::max);
-        let lanes = crate::field::tasks::on_every_thread(|| pulp::Arch::new().dispatch(Chains { rounds: 1 }));
+        let lanes = crate::tasks::on_every_thread(|| pulp::Arch::new().dispatch(Chains { rounds: 1 }));
         let ratio = multiply_add_rate() / plain;
         let (one, all) = (lanes[0] as f64, lanes.iter().sum::<usize>() as f64);
         assert!((one..64.0 * all).contains(&ratio), "{ratio} times a plain loop with {lanes:?} lanes");

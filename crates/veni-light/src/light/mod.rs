@@ -1,7 +1,7 @@
 //! What renderers need of an environment map: its lights, its harmonics, samples of it, prefiltered maps.
 //!
 //! Radiance is linear Rec. 709 in the units of the map; directions are of the [native frame](crate::sphere). Equations and the
-//! conventions of engines are in docs/LIGHT.md.
+//! conventions of engines are in docs/LIGHT.md and docs/LIGHT-ENGINES.md.
 //!
 //! | here | what |
 //! |---|---|
@@ -9,14 +9,23 @@
 //! | [`Light`], [`LightOptions`] | a map split into compact lights, the sun first, and the rest |
 //! | [`CompactLight`], [`Disc`] | one light, and its exact place on pixels |
 //! | [`sh`] | spherical harmonics |
+//! | [`Spectrum`] | harmonics up to degrees in the hundreds |
+//! | [`Prefilter`], [`CubeMap`], [`Dfg`] | prefiltered maps, and the table that goes with them |
+//! | [`Sampler`], [`SplitSampler`] | directions drawn by how much light comes from them |
 
+mod angle;
 mod compact;
 mod disc;
 mod environment;
 mod extract;
 mod lit;
 mod luminance;
+mod prefilter;
+mod quadrature;
+mod reduce;
+mod sampler;
 pub mod sh;
+mod spectrum;
 mod turn;
 
 pub use compact::{CompactLight, Kind, RadiusSource};
@@ -25,7 +34,10 @@ pub use environment::EnvironmentMap;
 pub use extract::SunChoice;
 pub use lit::{Light, LightOptions};
 pub use luminance::{LUMINANCE, luminance};
+pub use prefilter::{CubeAxes, CubeMap, Dfg, Law, Levels, Prefilter};
+pub use sampler::{Sample, Sampler, SplitSampler};
 pub use sh::Sh;
+pub use spectrum::{MAX_DEGREE, Spectrum};
 
 #[cfg(test)]
 mod tests;

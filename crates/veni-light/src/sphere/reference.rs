@@ -11,7 +11,7 @@ use super::Equirect;
 use super::gather::Pair;
 
 /// A camera direction in the native frame. The map is a reflection and its own inverse, so it also takes native
-/// directions to the camera frame, and the authors' latent vectors to native ones and back.
+/// directions to the camera frame, and the reference's latent vectors to native ones and back.
 #[inline]
 pub fn camera_to_native([x, y, z]: [f32; 3]) -> [f32; 3] {
     [-y, -x, z]

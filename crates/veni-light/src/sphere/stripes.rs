@@ -26,7 +26,7 @@ pub enum StripeSampling {
 /// - [`StripeSampling::Exact`]: meridians at azimuth π/2 + 2π(a+½)/w, heights z = −1 + 2(b+½)/h, the centres of cells
 ///   of equal area. Images are looked up by these parameters, with wrapped columns and clamped rows: rolling an
 ///   image by a whole number of stripes permutes the stripes and changes no bit, provided that T divides its width.
-/// - [`StripeSampling::Reference`]: the authors' grid ([`reference::line_directions`]), for their weights: first
+/// - [`StripeSampling::Reference`]: the reference's grid ([`reference::line_directions`]), for their weights: first
 ///   and last meridian coincide, both poles are sampled, the seam is not wrapped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stripes {
@@ -131,14 +131,6 @@ impl Stripes {
     /// If the image does not have W·H pixels.
     pub fn sample(&self, image: &[[f32; 3]], grid: Equirect) -> Vec<[f32; 3]> {
         self.gather(grid).sample(image)
-    }
-
-    /// [`Stripes::sample`] of the image turned by `yaw` radians; see [`Stripes::gather_turned`].
-    ///
-    /// # Panics
-    /// If the image does not have W·H pixels.
-    pub fn sample_turned(&self, image: &[[f32; 3]], grid: Equirect, yaw: f64) -> Vec<[f32; 3]> {
-        self.gather_turned(grid, yaw).sample(image)
     }
 
     /// z of height b of the exact grid.

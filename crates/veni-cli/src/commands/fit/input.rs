@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use clap::Args;
 use veni_fit::Observation;
-use veni_image::{Picture, read_mask};
+use veni_image::{Picture, ReadOptions, read_mask};
 use veni_light::sphere::{Equirect, View};
 
+use crate::args::Layer;
 use crate::output::with_remedy;
 use crate::report::Report;
+use crate::source;
 
 /// Longest side at which a photograph is fitted, in pixels.
 const LONGEST: usize = 96;
@@ -19,6 +21,9 @@ pub(crate) struct Input {
     /// OpenEXR, Radiance, PNG, JPEG or WebP files
     #[arg(required = true, value_name = "PICTURE")]
     pub(super) pictures: Vec<PathBuf>,
+
+    #[command(flatten)]
+    layer: Layer,
 
     /// Picture of the same size: white is known, black or transparent unknown
     #[arg(long, value_name = "MASK")]
@@ -50,7 +55,11 @@ impl Input {
     }
 
     pub(super) fn read(&self, path: &Path, report: Report) -> Result<Picture> {
-        let mut picture = Picture::read(path).map_err(with_remedy)?;
+        // a photograph is placed by --look, not by what it says of itself
+        let options =
+            ReadOptions { any_aspect: true, place_parts: self.fov.is_none(), ..self.layer.options() };
+        let mut picture = Picture::read_with(path, &options).map_err(with_remedy)?;
+        source::notes(path, picture.notes(), report);
         if let Some(path) = &self.mask {
             let (size, mask) = read_mask(path).map_err(with_remedy)?;
             if size != picture.size() {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use veni_fit::matching_exposure;
 use veni_fit::shade::{
@@ -10,6 +10,7 @@ use veni_fit::shade::{
     Transfer, read_albedo, read_mask,
 };
 use veni_image::Picture;
+use veni_light::Error;
 use veni_light::latent::Latent;
 use veni_light::sphere::{Equirect, View};
 
@@ -69,7 +70,7 @@ impl Shaded {
         picture: &Picture,
         view: Option<View>,
     ) -> Result<ShadedImage> {
-        let map = NormalMap::read(normals)?;
+        let map = NormalMap::read(normals).map_err(alone)?;
         let sizes = |path: &Path, size: [usize; 2]| -> Result<()> {
             if size != picture.size() {
                 let [[w, h], [pw, ph]] = [size, picture.size()];
@@ -80,7 +81,7 @@ impl Shaded {
         sizes(normals, map.size())?;
         let mask = match mask {
             Some(path) => {
-                let (size, mask) = read_mask(path)?;
+                let (size, mask) = read_mask(path).map_err(alone)?;
                 sizes(path, size)?;
                 Some(mask)
             }
@@ -91,7 +92,7 @@ impl Shaded {
             .map_err(|e| e.in_file(normals))?;
         let colour = match &self.albedo_map {
             Some(path) => {
-                let (size, colours) = read_albedo(path)?;
+                let (size, colours) = read_albedo(path).map_err(alone)?;
                 sizes(path, size)?;
                 Colour::Map(colours)
             }
@@ -167,5 +168,13 @@ impl Shaded {
             Shading::Physical => exposure,
             Shading::Reference => exposure.exp(),
         }
+    }
+}
+
+/// --layer is about the picture.
+fn alone(error: Error) -> anyhow::Error {
+    match error {
+        Error::Layers { .. } => anyhow!("{error}; save it alone in a file"),
+        other => other.into(),
     }
 }

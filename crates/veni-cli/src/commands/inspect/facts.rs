@@ -31,6 +31,14 @@ impl Facts {
         self.rows.push(("attribute", format!("{name} = {value}")));
     }
 
+    /// Sentences; machines find them as a list.
+    pub(super) fn notes(&mut self, sentences: &[String]) {
+        if !sentences.is_empty() {
+            self.rows.extend(sentences.iter().map(|sentence| ("note", sentence.clone())));
+            self.json.insert("notes".to_owned(), sentences.into());
+        }
+    }
+
     pub(super) fn has(&self, name: &str) -> bool {
         self.json.contains_key(name)
     }

@@ -4,15 +4,16 @@ use std::path::Path;
 
 use anyhow::{Result, anyhow};
 use serde_json::json;
-use veni_image::{self, Panorama};
+use veni_image::{self, Panorama, Provenance};
 use veni_light::latent::Latent;
 
 use super::facts::Facts;
 use super::latent;
 use super::statistics::Statistics;
-use crate::output::{CUBE_FACES, FRAME, LATENT, with_remedy};
+use crate::args::Layer;
+use crate::output::{CAMERA, CUBE_FACES, FRAME, LATENT, with_remedy};
 
-pub(super) fn describe(path: &Path) -> Result<Facts> {
+pub(super) fn describe(path: &Path, layer: &Layer) -> Result<Facts> {
     let attributes = veni_image::attributes(path).map_err(with_remedy)?;
     let exr = exr_facts(path)?;
     let mut facts = Facts::new(if exr.is_some() { "OpenEXR image" } else { "Radiance HDR image" });
@@ -38,18 +39,30 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     {
         facts.attribute(name, value);
     }
-    if !cube {
-        radiance(path, &mut facts)?;
+    // a rendered picture is no panorama
+    if !cube && !attributes.contains_key(CAMERA) {
+        radiance(Panorama::read_with(path, &layer.options()).map_err(with_remedy)?, path, &mut facts)?;
     }
     Ok(facts)
 }
 
-fn radiance(path: &Path, facts: &mut Facts) -> Result<()> {
-    let mut image = Panorama::read(path)?;
+/// What the pixels say.
+pub(super) fn radiance(mut image: Panorama, path: &Path, facts: &mut Facts) -> Result<()> {
     let grid = image.grid();
     if !facts.has("size") {
         facts.add("size", format!("{} x {}", grid.width, grid.height), json!([grid.width, grid.height]));
     }
+    match image.provenance() {
+        Provenance::Unrecorded => {}
+        Provenance::Same => facts.add("pixels", "those that the attributes were written with", "same"),
+        Provenance::Changed => facts.add(
+            "pixels",
+            "changed after the attributes were written: a latent or a factor among these is not theirs",
+            "changed",
+        ),
+    }
+    reservations(image.notes(), image.unknown(), facts);
+    image.fill();
     let bad = image.sanitise().map_err(|e| e.in_file(path))?;
     if bad.total() > 0 {
         facts.add(
@@ -82,6 +95,14 @@ fn radiance(path: &Path, facts: &mut Facts) -> Result<()> {
         }),
     );
     Ok(())
+}
+
+/// What is unknown, and what the file says besides.
+pub(super) fn reservations(notes: &[String], unknown: f64, facts: &mut Facts) {
+    if unknown > 0.0 {
+        facts.add("unknown", format!("{:.1} % of the pixels", 100.0 * unknown), unknown);
+    }
+    facts.notes(notes);
 }
 
 struct Exr {

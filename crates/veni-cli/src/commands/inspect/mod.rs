@@ -2,12 +2,14 @@
 
 #[cfg(feature = "gpu")]
 mod devices;
+mod display;
 mod facts;
 mod image;
 mod latent;
 mod model;
 pub(crate) mod run;
 mod statistics;
+mod texture;
 
 use std::fs::File;
 use std::io::Read;
@@ -15,8 +17,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
+use veni_image::LdrPanorama;
+use veni_image::texture::{EnvHeader, Ktx2Header};
 use veni_light::Error;
 
+use crate::args::Layer;
 use crate::features::{GPU, only};
 use crate::report::{self, Outcome, Report};
 use facts::Facts;
@@ -29,15 +34,19 @@ const DEVICES: &str = "\n\nWith --devices: every graphics device that could bake
 
 #[cfg_attr(
     feature = "gpu",
-    doc = "Show what is inside models, latents, images and training runs, or the graphics devices"
+    doc = "Show what is inside models, latents, images, textures and training runs, or the graphics devices"
 )]
-#[cfg_attr(not(feature = "gpu"), doc = "Show what is inside models, latents, images and training runs")]
+#[cfg_attr(
+    not(feature = "gpu"),
+    doc = "Show what is inside models, latents, images, textures and training runs"
+)]
 #[derive(Args, Debug)]
 #[command(
-    long_about = format!("Show what is inside models, latents, images and training runs.\n\n\
+    long_about = format!("Show what is inside models, latents, images, textures and training runs.\n\n\
         Model: sizes, identity, training data, prior. Latent: vectors, lengths, exposure, the model it belongs to. \
         Image: size, storage, attributes, radiance over the sphere, dynamic range, where the sun is, the latent it \
-        was baked from. Run folder: how far it is, how good.\n\n\
+        was baked from, what is unknown of it, and what the file says that is not applied. Texture (KTX2, Babylon.js .env): \
+        format, size, faces, levels. Run folder: how far it is, how good.\n\n\
         The content decides what a file is, not its name. Radiance statistics are weighted by solid angle.{}",
         only(GPU, DEVICES)),
     after_help = format!("Examples:\n  \
@@ -53,6 +62,9 @@ pub(crate) struct Inspect {
     #[arg(value_name = "FILE")]
     files: Vec<PathBuf>,
 
+    #[command(flatten)]
+    layer: Layer,
+
     /// List the graphics devices instead, and measure and check each
     #[cfg(feature = "gpu")]
     #[arg(long, conflicts_with = "files")]
@@ -67,13 +79,13 @@ impl Inspect {
         }
         report::each(&self.files, |path| {
             let name = path.display().to_string();
-            let facts = describe(path)?;
+            let facts = describe(path, &self.layer)?;
             report.result(facts.text(&name), &facts.json("file", &name))
         })
     }
 }
 
-fn describe(path: &Path) -> Result<Facts> {
+fn describe(path: &Path, layer: &Layer) -> Result<Facts> {
     if path.is_dir() {
         return run::describe(path);
     }
@@ -85,7 +97,10 @@ fn describe(path: &Path) -> Result<Facts> {
         [] => bail!("{}: the file is empty; nothing can be said about it", path.display()),
         // safetensors: the length of a JSON header in 8 bytes, then that header
         [_, _, _, _, _, 0, 0, 0, b'{', ..] => model::describe(path),
+        start if Ktx2Header::recognises(start) => texture::ktx2(path),
+        start if EnvHeader::recognises(start) => texture::env(path),
         text if text.trim_ascii_start().starts_with(b"{") => latent::describe(path),
-        _ => image::describe(path),
+        _ if LdrPanorama::recognise(path)? => display::describe(path),
+        _ => image::describe(path, layer),
     }
 }

@@ -9,7 +9,7 @@ use veni_image::{Panorama, luminance};
 const SUN_SOLID_ANGLE: f64 = 0.01;
 /// Bins per octave of the luminance histogram: quantiles are good to 0.3 %.
 const BINS_PER_OCTAVE: f32 = 256.0;
-/// Octaves covered, 2⁻⁶⁴ to 2⁶⁴.
+/// Octaves covered, 2⁻⁶⁴ to 2⁶⁴ times the panorama's unit.
 const OCTAVES: f32 = 128.0;
 
 /// Of a clean panorama; luminance (Rec. 709), weighted by solid angle.
@@ -51,7 +51,7 @@ impl Statistics {
 
     /// The panorama must be clean ([`Panorama::sanitise`]).
     pub(super) fn of(image: &Panorama) -> Self {
-        let grid = image.grid();
+        let (grid, unit) = (image.grid(), image.unit());
         let rows =
             || image.pixels().chunks_exact(grid.width).enumerate().map(|(j, r)| (j, grid.solid_angle(j), r));
         let (mut min, mut max, mut total, mut sphere) = (f32::INFINITY, 0f32, 0.0, 0.0);
@@ -62,10 +62,10 @@ impl Statistics {
                 (min, max) = (min.min(y), max.max(y));
                 total += weight * f64::from(y);
                 sphere += weight;
-                histogram[bin(y)] += weight;
+                histogram[bin(y / unit)] += weight;
             }
         }
-        let median = value(quantile_bin(&histogram, sphere / 2.0)).clamp(min, max);
+        let median = (value(quantile_bin(&histogram, sphere / 2.0)) * unit).clamp(min, max);
         let brightest = quantile_bin(&histogram, (sphere - SUN_SOLID_ANGLE).max(0.0));
         // of the darkest bin that takes part only so much as fills the solid angle
         let above: f64 = histogram[brightest + 1..].iter().sum();
@@ -74,7 +74,7 @@ impl Statistics {
         for (j, weight, row) in rows() {
             for (i, pixel) in row.iter().enumerate() {
                 let y = luminance(*pixel);
-                let part = match bin(y).cmp(&brightest) {
+                let part = match bin(y / unit).cmp(&brightest) {
                     Ordering::Less => continue,
                     Ordering::Equal => part,
                     Ordering::Greater => 1.0,

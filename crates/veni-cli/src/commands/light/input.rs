@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use veni_image::Panorama;
 use veni_light::sphere::Equirect;
 
-use crate::args::ModelArgs;
+use crate::args::{Layer, ModelArgs};
 use crate::output::{CUBE_FACES, SCENE, with_remedy};
 use crate::report::Report;
 use crate::source;
@@ -32,6 +32,7 @@ pub(super) struct Input {
 pub(super) fn read(
     named: Named<'_>,
     model: &ModelArgs,
+    layer: &Layer,
     size: Option<(usize, usize)>,
     report: Report,
 ) -> Result<Input> {
@@ -45,7 +46,7 @@ pub(super) fn read(
         }
         Named::File(path) if source::is_latent(path)? => {
             let loaded = source::model_of(model, [path])?;
-            let latent = source::from_file(path, &loaded, report)?;
+            let latent = source::from_file(path, layer, &loaded, report)?;
             (path.display().to_string(), loaded, latent)
         }
         Named::File(path) => {
@@ -60,7 +61,7 @@ pub(super) fn read(
                 );
             }
             let unit = if attributes.contains_key(SCENE) { 1000.0 } else { 1.0 };
-            let panorama = source::panorama(path, report)?;
+            let panorama = source::panorama(path, layer, report)?;
             return Ok(Input { name: path.display().to_string(), panorama, unit });
         }
     };

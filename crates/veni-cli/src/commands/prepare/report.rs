@@ -19,6 +19,7 @@ pub(super) fn write(
     placing: &Placing,
     placed: &Placed,
     ignored: &[PathBuf],
+    gone: &[String],
 ) -> Result<()> {
     let ignored: Vec<String> = ignored.iter().map(|p| p.display().to_string()).collect();
     let mut files: Vec<Value> = placed.kept.iter().map(kept).collect();
@@ -46,19 +47,23 @@ pub(super) fn write(
         "settings": settings,
         "seed": placing.seed,
         "shares": placing.shares,
-        "counts": counts(placed, ignored.len()),
+        "counts": counts(placed, ignored.len(), gone.len()),
         "files": files,
+        "gone": gone,
         "near_duplicates": alike,
     });
     write_json(&store.root().join("report.json"), &value)?;
-    write_bytes(&store.root().join("report.md"), markdown(settings, placing, placed, &ignored)?.as_bytes())
+    write_bytes(
+        &store.root().join("report.md"),
+        markdown(settings, placing, placed, &ignored, gone)?.as_bytes(),
+    )
 }
 
 /// The result of the command; files that were refused make it a negative one.
-pub(super) fn print(output: &Path, placed: &Placed, report: Report) -> Result<Outcome> {
+pub(super) fn print(output: &Path, placed: &Placed, gone: &[String], report: Report) -> Result<Outcome> {
     let refused: Vec<Value> =
         placed.refused.iter().map(|(r, reason)| json!({"source": r.source, "reason": reason})).collect();
-    let mut value = counts(placed, 0);
+    let mut value = counts(placed, 0, gone.len());
     if let Value::Object(map) = &mut value {
         map.remove("ignored");
         map.insert("folder".into(), json!(output.display().to_string()));
@@ -81,7 +86,7 @@ fn side(placed: &Placed, split: Split) -> usize {
     placed.kept.iter().filter(|k| k.split == split).count()
 }
 
-fn counts(placed: &Placed, ignored: usize) -> Value {
+fn counts(placed: &Placed, ignored: usize, gone: usize) -> Value {
     json!({
         "kept": placed.kept.len(),
         "train": side(placed, Split::Train),
@@ -91,6 +96,7 @@ fn counts(placed: &Placed, ignored: usize) -> Value {
         "duplicates": placed.duplicates.len(),
         "refused": placed.refused.len(),
         "ignored": ignored,
+        "gone": gone,
     })
 }
 
@@ -119,6 +125,7 @@ fn markdown(
     placing: &Placing,
     placed: &Placed,
     ignored: &[String],
+    gone: &[String],
 ) -> Result<String, std::fmt::Error> {
     let mut out = String::new();
     let Settings { width, height, .. } = settings;
@@ -145,6 +152,7 @@ fn markdown(
         placed.duplicates.len(),
         ignored.len()
     )?;
+    section(&mut out, "Kept, though their sources are gone", gone.iter().cloned())?;
     section(&mut out, "Refused", placed.refused.iter().map(|(r, reason)| format!("{}: {reason}", r.source)))?;
     section(
         &mut out,

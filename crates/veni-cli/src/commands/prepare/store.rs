@@ -23,6 +23,7 @@ use veni_light::output::{Overwrite, write_atomic};
 use super::network::NetworkSettings;
 use super::record::Record;
 use super::scan::Source;
+use crate::args::Layer;
 use crate::output::{PROBE, writable};
 use crate::shard::Shard;
 
@@ -40,6 +41,9 @@ pub(super) struct Settings {
     /// What expands instead of the fitted functions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) network: Option<NetworkSettings>,
+    /// Of EXR files with several layers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    layer: Option<String>,
 }
 
 /// The folder that is filled.
@@ -69,7 +73,11 @@ impl Settings {
             Some(Transfer::Gamma(gamma)) => format!("gamma {gamma}"),
             Some(_) => "srgb".to_owned(),
         };
-        Self { format: FORMAT, width, height, expand, network }
+        Self { format: FORMAT, width, height, expand, network, layer: None }
+    }
+
+    pub(super) fn of_layer(self, layer: &Layer) -> Self {
+        Self { layer: layer.layer.clone(), ..self }
     }
 
     /// How LDR images are expanded, in words.

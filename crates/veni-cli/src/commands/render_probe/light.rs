@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
 
-use crate::args::ModelArgs;
+use crate::args::{Layer, ModelArgs};
 use crate::output::{CUBE_FACES, with_remedy};
 use crate::report::Report;
 use crate::source::{self, Loaded};
@@ -14,6 +14,7 @@ use crate::source::{self, Loaded};
 /// Radiance of every light of a file's panorama or latent, turned by `turn` radians.
 pub(super) fn from_file(
     path: &Path,
+    layer: &Layer,
     model: &ModelArgs,
     grid: Equirect,
     turn: f64,
@@ -21,13 +22,13 @@ pub(super) fn from_file(
 ) -> Result<Vec<[f32; 3]>> {
     if source::is_latent(path)? {
         let loaded = source::model_of(model, [path])?;
-        let latent = source::from_file(path, &loaded, report)?;
+        let latent = source::from_file(path, layer, &loaded, report)?;
         return decode(&loaded, &latent, grid, turn);
     }
     if veni_image::attributes(path).map_err(with_remedy)?.contains_key(CUBE_FACES) {
         bail!("{}: a cube map is not a panorama; name an equirectangular image", path.display());
     }
-    let image = source::panorama(path, report)?;
+    let image = source::panorama(path, layer, report)?;
     Ok(image.resample_turned(grid, turn).into_pixels())
 }
 

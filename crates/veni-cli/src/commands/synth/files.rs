@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use veni_image::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions, attributes};
+use veni_image::{
+    HALF_ERROR, HalfRange, Panorama, Precision, WriteFormat, WriteOptions, attributes, half_error,
+};
 use veni_light::Error;
 use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
@@ -73,10 +75,15 @@ impl Files {
         if self.resume && path.exists() {
             return Ok(());
         }
-        let mut options = WriteOptions::new(WriteFormat::Exr(self.precision));
+        let factor = scale(panorama);
+        // a scene that is wider than half precision stays whole
+        let keeps = || half_error(panorama.pixels(), factor) <= HALF_ERROR;
+        let half = self.precision == Precision::Half && keeps();
+        let mut options =
+            WriteOptions::new(WriteFormat::Exr(if half { Precision::Half } else { Precision::Float }));
         options.overwrite = self.overwrite;
-        if self.precision == Precision::Half {
-            options.half_range = HalfRange::Factor(scale(panorama));
+        if half {
+            options.half_range = HalfRange::Factor(factor);
         }
         options.attributes.insert(SCENE.to_owned(), json(scene)?);
         options.attributes.insert(SIZE.to_owned(), size(panorama.grid()));

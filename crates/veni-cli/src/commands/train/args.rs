@@ -49,6 +49,10 @@ pub(crate) struct Train {
     #[arg(long, value_name = "N")]
     pub(super) synthetic: Option<usize>,
 
+    /// Layer of EXR files that have several [default: the one without a name, or called like a picture: Combined, beauty, C]
+    #[arg(long, value_name = "NAME")]
+    pub(super) layer: Option<String>,
+
     /// Cross-validation: hold back the I-th of N parts of the panoramas, and validate by it instead of by val/;
     /// 'veni-cli evaluate --fold I/N' reports on it
     #[arg(long, value_name = "I/N", value_parser = fold)]

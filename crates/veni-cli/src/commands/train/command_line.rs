@@ -22,6 +22,9 @@ impl Train {
         for folder in &self.data {
             words.push(format!("--data {}", last(folder)));
         }
+        if let Some(layer) = &self.layer {
+            words.push(format!("--layer {}", shell_word(Path::new(layer))));
+        }
         if let Some(fold) = self.fold {
             words.push(format!("--fold {fold}"));
         }

@@ -22,6 +22,7 @@ impl Train {
             || self.steps.is_some()
             || self.synthetic.is_some()
             || self.fold.is_some()
+            || self.layer.is_some()
             || self.device.is_some()
             || self.devices.is_some()
             || self.mixed_precision

@@ -1,6 +1,6 @@
 use super::*;
 
-/// A real file of PyTorch's (the authors' trainer), and numbers that were read from it there.
+/// A real file of PyTorch's (the reference's trainer), and numbers that were read from it there.
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/ckpt_renipp");
 
 fn real() -> Vec<u8> {

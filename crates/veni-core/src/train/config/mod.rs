@@ -101,7 +101,7 @@ fn is_first(devices: &Devices) -> bool {
 pub enum Order {
     /// Every panorama once per epoch, in a new order each time.
     Shuffle,
-    /// Independently, with replacement (the authors').
+    /// Independently, with replacement (the reference's).
     Replacement,
 }
 

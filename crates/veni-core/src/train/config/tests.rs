@@ -171,7 +171,7 @@ fn pretraining_is_a_stage_before_with_ten_times_the_rates() {
         let LearningRate::Cosine { rate, .. } = second.config.decoder.learning_rate else {
             panic!("a cosine")
         };
-        assert!(preset != Preset::Paper || rate == 1e-5, "the authors' rate: {rate}");
+        assert!(preset != Preset::Paper || rate == 1e-5, "the reference's rate: {rate}");
         assert!(two.pretrained_on(&["ldr".into()], 0, 1).unwrap_err().to_string().contains("pretrain"));
     }
     assert!(Preset::Tiny.auto_decoder(3).pretrained_on(&["ldr".into()], 0, 1).is_err());

@@ -67,10 +67,10 @@ impl Mage {
     }
 }
 
-/// Which derivative the authors' module compares.
+/// Which derivative the reference's module compares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operator {
-    /// A pair of first derivatives, of which the authors' second one is [`REFERENCE_VERTICAL`].
+    /// A pair of first derivatives, of which the reference's second one is [`REFERENCE_VERTICAL`].
     Scharr,
     /// One second derivative.
     Laplace,

@@ -20,7 +20,7 @@ pub enum Space {
 /// much each pixel counts (1 everywhere where absent).
 ///
 /// Corrected: Σ w d²/Σ w, w = rows × mask. Reference: mean((w d)²), the weight inside the square and not
-/// divided out; and the authors' "LDR" error is computed in log space. `[B, H, W, 3]` → `[1]`.
+/// divided out; and the reference's "LDR" error is computed in log space. `[B, H, W, 3]` → `[1]`.
 pub fn mse(
     form: LossForm,
     space: Space,

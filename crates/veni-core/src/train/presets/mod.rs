@@ -18,7 +18,7 @@ pub enum Preset {
     Tiny,
     /// As good as an hour on two cores can buy.
     Small,
-    /// The paper's sizes and the authors' optimisation (REFERENCE numbers throughout).
+    /// The paper's sizes and the reference's optimisation (REFERENCE numbers throughout).
     Paper,
 }
 
@@ -46,13 +46,13 @@ impl Preset {
     }
 
     /// The auto-decoder RENI++ for N latent vectors, with the decoder of [`config`](Self::config) and without data
-    /// folders. Losses, rates and rays are the authors'; only steps, rays and their validation depend on the preset.
+    /// folders. Losses, rates and rays are the reference's; only steps, rays and their validation depend on the preset.
     pub fn auto_decoder(self, latent_vectors: usize) -> TrainConfig {
         auto_decoder::preset(self, latent_vectors)
     }
 }
 
-/// How much lower the learning rates of fine-tuning are: the authors' (1e-5 and 1e-4 after 1e-4 and 1e-3).
+/// How much lower the learning rates of fine-tuning are: the reference's (1e-5 and 1e-4 after 1e-4 and 1e-3).
 const FINE: f64 = 10.0;
 
 impl TrainConfig {

@@ -15,7 +15,7 @@ use veni_light::random::Stream;
 /// ```text
 /// a_e = α_e t                                    where α_e β_e ≥ 0
 /// a_e = 0                                        otherwise, for the true projection
-/// a_e = α_e t (1 − m/√max(m, g)), m = β_e² t     otherwise, in the authors' form; g is their guard
+/// a_e = α_e t (1 − m/√max(m, g)), m = β_e² t     otherwise, in the reference's form; g is their guard
 /// ```
 ///
 /// It knows only |z_xy| and z_z; relative angles between latent vectors reach the network through the

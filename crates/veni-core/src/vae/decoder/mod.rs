@@ -220,7 +220,7 @@ impl Decoder {
     }
 }
 
-/// Z R for every latent vector z as a row, as the authors' field does before decoding:
+/// Z R for every latent vector z as a row, as the reference's field does before decoding:
 /// latents [B, N, 3], matrix [3, 3] → [B, N, 3].
 pub fn rotate(latent: Tensor<3>, rotation: Tensor<2>) -> Tensor<3> {
     latent.matmul(rotation.unsqueeze())

@@ -21,6 +21,8 @@
 
 mod blend;
 #[cfg(feature = "onnx")]
+mod graph_check;
+#[cfg(feature = "onnx")]
 mod onnx;
 #[cfg(all(test, feature = "onnx"))]
 mod onnx_file;
@@ -29,6 +31,8 @@ mod onnx_tests;
 mod surround;
 #[cfg(test)]
 mod tests;
+#[cfg(feature = "onnx")]
+mod wire;
 
 use std::fmt::Debug;
 
@@ -180,8 +184,10 @@ pub(super) fn expand_by(
     let grid = options.seen(ldr.grid(), network);
     let shown = match (options.input, options.transfer) {
         (NetworkInput::Linear, _) => linear.clone(),
-        (NetworkInput::Srgb, Transfer::Srgb) => Panorama::new(ldr.grid(), ldr.values().to_vec()),
-        (NetworkInput::Srgb, Transfer::Gamma(_)) => {
+        (NetworkInput::Srgb, Transfer::Srgb) if ldr.is_srgb() => {
+            Panorama::new(ldr.grid(), ldr.values().to_vec())
+        }
+        (NetworkInput::Srgb, _) => {
             Panorama::new(ldr.grid(), linear.pixels().iter().map(|p| p.map(tonemap::srgb)).collect())
         }
     };

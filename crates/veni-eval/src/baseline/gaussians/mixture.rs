@@ -1,4 +1,4 @@
-//! Positive lobes that add up to radiance, with the error in log radiance: what the authors' baseline does, over the whole
+//! Positive lobes that add up to radiance, with the error in log radiance: as the reference's baseline, over the whole
 //! sphere and by solid angle.
 
 use super::descent::Problem;

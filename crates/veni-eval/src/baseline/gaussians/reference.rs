@@ -1,4 +1,4 @@
-//! Spherical Gaussians as the authors' baseline computes them, for their numbers only. MODEL (53).
+//! Spherical Gaussians as the reference's baseline computes them, for their numbers only. MODEL (53).
 //!
 //! The lobes sit on a grid of the *upper* hemisphere and may move by one and a half cells. Their option
 //! `row_col_gaussian_dims` is unpacked as (columns, rows). Directions are of the camera frame
@@ -28,7 +28,7 @@ struct Lobe {
 }
 
 impl Grid {
-    /// From the authors' option `row_col_gaussian_dims`, in its order.
+    /// From the reference's option `row_col_gaussian_dims`, in its order.
     pub fn from_row_col_gaussian_dims([columns, rows]: [usize; 2]) -> Self {
         Self { rows, columns }
     }

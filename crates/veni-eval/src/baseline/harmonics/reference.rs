@@ -1,4 +1,4 @@
-//! Spherical harmonics as the authors' baseline computes them, for their numbers only.
+//! Spherical harmonics as the reference's baseline computes them, for their numbers only.
 //!
 //! There are two parts that do not agree with each other: the projection of an image samples pixel *corners* and counts
 //! the azimuth along the columns; the field takes a direction of the camera frame (see

@@ -48,7 +48,7 @@ fn axes(case: &Case, invariant: &str) -> Vec<usize> {
     }
 }
 
-/// Which of the authors' packages a ReLU is from.
+/// Which of the reference's packages a ReLU is from.
 fn form(case: &Case, layer: VectorLayer) -> VnReluForm {
     let from = |key: &str, word: &str| case.text(key).is_some_and(|v| v.contains(word));
     let norm_guard = from("variant", "sox") || from("variant", "reni") || from("package", "reni");

@@ -4,6 +4,7 @@
 //! the AV1 stream says, and an unspecified matrix is that of BT.601.
 
 mod frame;
+mod sequence;
 #[cfg(test)]
 mod tests;
 
@@ -12,42 +13,70 @@ use std::path::Path;
 
 use avif_parse::AvifData;
 
-use super::{LdrPanorama, ReadOptions};
+use super::meaning::Meaning;
+use super::spaces::h273;
+use super::{LdrPanorama, ReadOptions, icc, precheck};
+use crate::limits::{MAX_FILE_BYTES, at_most};
 use crate::{Error, Result};
 use frame::Frame;
+use sequence::Sequence;
 
 /// Code points of H.273 for what display values mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Coding {
+    primaries: u8,
     transfer: u8,
     matrix: u8,
     full_range: bool,
 }
 
-pub(super) fn read(mut file: impl Read, path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
+/// All bytes of the file, within the limit.
+fn content(file: impl Read, path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
+    at_most("bytes of file", bytes.len() as u64, MAX_FILE_BYTES)?;
+    Ok(bytes)
+}
+
+/// The size that the picture's stream declares.
+pub(super) fn declared(file: impl Read, path: &Path) -> Result<[u64; 2]> {
+    let data = AvifData::from_reader(&mut content(file, path)?.as_slice()).map_err(wrap)?;
+    Ok(Sequence::of(&data.primary_item)?.size)
+}
+
+pub(super) fn read(file: impl Read, path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
+    let bytes = content(file, path)?;
     let data = AvifData::from_reader(&mut bytes.as_slice()).map_err(wrap)?;
-    let header = data.primary_item_metadata().map_err(wrap)?;
-    let size = [header.max_frame_width, header.max_frame_height].map(|n| n.get() as usize);
+    let sequence = Sequence::of(&data.primary_item)?;
+    let size = sequence.size.map(|n| n as usize);
     let grid = options.check(size[0], size[1])?;
+    precheck::room(Some(sequence.size), options)?;
     let properties = properties(&bytes);
     refuse_transformed(properties)?;
 
     let limit = u32::try_from(options.max_pixels).unwrap_or(u32::MAX);
+    let coding = nclx(properties).unwrap_or(sequence.coding);
+    let meaning = meaning(properties, coding, options)?;
     let colour = Frame::decode(&data.primary_item, limit)?;
-    let coding = nclx(properties).unwrap_or_else(|| colour.coding());
-    refuse_other_curves(coding.transfer)?;
     if colour.size() != size {
         return Err(Error::invalid("damaged AVIF file: the picture is not as large as its header says"));
     }
-    let mut panorama = LdrPanorama::new(grid, colour.rgb(coding)?);
+    let mut panorama = LdrPanorama { meaning, ..LdrPanorama::new(grid, colour.rgb(coding)?) };
     if let Some(alpha) = &data.alpha_item {
+        let Sequence { size: claimed, coding } = Sequence::of(alpha)?;
+        if claimed != sequence.size {
+            return Err(Error::invalid("damaged AVIF file: its alpha is not as large as the picture"));
+        }
         let alpha = Frame::decode(alpha, limit)?;
         if alpha.size() != size {
             return Err(Error::invalid("damaged AVIF file: its alpha is not as large as the picture"));
         }
-        panorama.alpha = Some(alpha.opacity()).filter(|alpha| alpha.iter().any(|a| *a < 1.0));
+        let known = alpha.opacity(coding.full_range);
+        if data.premultiplied_alpha {
+            let pixels = panorama.values.iter_mut().zip(&known).filter(|(_, known)| **known > 0.0);
+            pixels.for_each(|(pixel, known)| *pixel = pixel.map(|v| (v / known).min(1.0)));
+        }
+        panorama.known = Some(known).filter(|known| known.iter().any(|k| *k < 1.0));
     }
     Ok(panorama)
 }
@@ -82,8 +111,8 @@ fn after<'a>(properties: &'a [u8], name: &[u8]) -> Option<&'a [u8]> {
 }
 
 fn nclx(properties: &[u8]) -> Option<Coding> {
-    let &[_, _, _, transfer, _, matrix, range] = after(properties, b"colrnclx")?.first_chunk()?;
-    Some(Coding { transfer, matrix, full_range: range & 0x80 != 0 })
+    let &[_, primaries, _, transfer, _, matrix, range] = after(properties, b"colrnclx")?.first_chunk()?;
+    Some(Coding { primaries, transfer, matrix, full_range: range & 0x80 != 0 })
 }
 
 fn refuse_transformed(properties: &[u8]) -> Result<()> {
@@ -98,14 +127,18 @@ fn refuse_transformed(properties: &[u8]) -> Result<()> {
     }
 }
 
-fn refuse_other_curves(transfer: u8) -> Result<()> {
-    let name = match transfer {
-        // BT.709, unspecified, BT.601, sRGB, BT.2020: curves so close that all of them are taken for sRGB
-        1 | 2 | 6 | 13..=15 => return Ok(()),
-        8 => "linear".to_owned(),
-        16 => "PQ (high dynamic range)".to_owned(),
-        18 => "HLG (high dynamic range)".to_owned(),
-        other => format!("transfer characteristic {other} of H.273"),
-    };
-    Err(Error::unsupported(format!("AVIF with values in {name} is not read; convert it to EXR")))
+/// A profile goes before code points, of which only matrix and range then count (MIAF, 7.3.6.4).
+fn meaning(properties: &[u8], coding: Coding, options: &ReadOptions) -> Result<Meaning> {
+    if options.data {
+        return Ok(Meaning::default());
+    }
+    let profile = [b"colrprof".as_slice(), b"colrrICC"].into_iter().find_map(|name| {
+        let at = properties.windows(name.len()).position(|window| window == name)?;
+        let length = u32::from_be_bytes(*properties.get(at.checked_sub(4)?..)?.first_chunk()?) as usize;
+        properties.get(at + name.len()..(at - 4).checked_add(length)?)
+    });
+    match profile {
+        Some(profile) => icc::meaning(profile),
+        None => h273(coding.primaries, coding.transfer, "AVIF"),
+    }
 }

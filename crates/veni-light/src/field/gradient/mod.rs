@@ -24,8 +24,9 @@ mod transposed;
 )]
 mod weight_sums;
 
+use super::Field;
 use super::aligned::Aligned;
-use super::{Field, tasks};
+use crate::tasks;
 use backward::{Backward, Sums};
 
 pub(super) use normal::ValueOutput;

@@ -16,7 +16,7 @@ use crate::field::aligned::Aligned;
 use crate::field::bfloat16::Bfloat16;
 use crate::field::block::Blocks;
 use crate::field::mlp::Mlp;
-use crate::field::tasks;
+use crate::tasks;
 
 /// Directions of a forward task.
 const FORWARD: usize = 192;

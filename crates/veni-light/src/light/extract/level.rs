@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use crate::field::tasks;
 use crate::sphere::Equirect;
+use crate::tasks;
 
 /// The map as means over blocks of k × k pixels; the last block of a row or column may be smaller.
 #[derive(Clone, Debug)]

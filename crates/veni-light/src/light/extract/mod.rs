@@ -9,8 +9,8 @@ mod vector;
 
 use super::compact::{CompactLight, Kind};
 use super::luminance::luminance;
-use crate::field::tasks;
 use crate::sphere::Equirect;
+use crate::tasks;
 pub(super) use level::Level;
 use level::View;
 use measure::{Measured, core_centre, luminance_of, measure};

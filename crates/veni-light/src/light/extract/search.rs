@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use super::level::View;
-use crate::field::tasks;
 use crate::light::luminance::luminance;
+use crate::tasks;
 
 /// Radii of the caps, degrees.
 const RADII: [f64; 4] = [2.5, 5.0, 10.0, 20.0];

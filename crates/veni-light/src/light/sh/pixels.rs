@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use super::{Basis, Sh};
-use crate::field::tasks;
 use crate::sphere::Equirect;
+use crate::tasks;
 
 /// Nodes and weights of Gauss–Legendre quadrature on [0, 1], three points: exact to degree 5, and rows are narrow.
 const NODES: [(f64, f64); 3] =

@@ -1,0 +1,212 @@
+//! OpenEXR through the block interface of the `exr` crate: its header is judged before anything is allocated,
+//! and only the channels that are needed are kept.
+
+mod layers;
+mod pixels;
+mod tags;
+
+use std::collections::BTreeMap;
+use std::io::{Read, Seek};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use exr::math::Vec2;
+use exr::meta::BlockDescription;
+use exr::meta::attribute::{AttributeValue, EnvironmentMap, Text};
+use exr::meta::header::Header;
+use rayon::prelude::*;
+
+use super::ReadOptions;
+use super::meaning::Meaning;
+use crate::limits::{MAX_EXR_BLOCK_BYTES, MAX_EXR_CHANNELS, MAX_EXR_CHUNKS, MAX_EXR_PARTS, at_most};
+use crate::numbered::join;
+use crate::{Error, Result};
+use crate::{Panorama, Provenance, RADIANCE_SCALE};
+use veni_light::sphere::Equirect;
+
+pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -> Result<Panorama> {
+    guarded(|| {
+        let reader = exr::block::read(file, false).map_err(|e| wrap(e, path))?;
+        judge_parts(reader.headers(), options)?;
+        let choice = layers::choose(reader.headers(), options)?;
+        let header = reader.headers()[choice.part].clone();
+        let grid = judge(&header, options)?;
+        let attributes = text(&header);
+        let meaning = if options.data {
+            Meaning::linear()
+        } else {
+            tags::meaning(&header, &attributes, choice.coloured)?
+        };
+        let mut panorama = Panorama::new(grid, vec![[0.0; 3]; grid.len()]);
+        let mut known = stored_window(&header, grid, choice.alpha.is_some());
+        pixels::read(reader, path, &choice, &header, &mut panorama.pixels, known.as_deref_mut(), grid)?;
+        panorama.attributes = attributes;
+        panorama.note_provenance();
+        panorama.notes.clone_from(&meaning.notes);
+        panorama.known = known;
+        if choice.alpha.is_some() {
+            cover(&mut panorama, options.data);
+        }
+        meaning.apply(&mut panorama.pixels);
+        match panorama.attributes.get(RADIANCE_SCALE) {
+            Some(factor) if panorama.provenance == Provenance::Changed => panorama.notes.push(format!(
+                "its pixels were changed after {RADIANCE_SCALE} = {factor} was written; they are taken as they are, not \
+                 divided by it"
+            )),
+            Some(factor) => {
+                let factor = factor.parse().ok().filter(|f: &f32| f.is_normal() && *f > 0.0);
+                let factor = factor
+                    .ok_or_else(|| Error::invalid(format!("attribute {RADIANCE_SCALE} is not a factor")))?;
+                panorama.scale(1.0 / factor);
+            }
+            None => {}
+        }
+        Ok(panorama)
+    })
+}
+
+/// What the data window leaves uncovered is unknown: 0 there and 1 elsewhere, as far as that has to be written down.
+fn stored_window(header: &Header, grid: Equirect, alpha: bool) -> Option<Vec<f32>> {
+    let (display, data) = (header.shared_attributes.display_window, header.own_attributes.layer_position);
+    let axis = |display: i32, data: i32, size: usize, whole: usize| {
+        let first = i64::from(data) - i64::from(display);
+        let inside = |at: i64| at.clamp(0, whole as i64) as usize;
+        inside(first)..inside(first + size as i64)
+    };
+    let Vec2(width, height) = header.layer_size;
+    let columns = axis(display.position.0, data.0, width, grid.width);
+    let rows = axis(display.position.1, data.1, height, grid.height);
+    let whole = columns.len() == grid.width && rows.len() == grid.height;
+    if whole && !alpha {
+        return None;
+    }
+    let mut known = vec![0.0; grid.len()];
+    for line in known.chunks_exact_mut(grid.width).skip(rows.start).take(rows.len()) {
+        line[columns.clone()].fill(1.0);
+    }
+    Some(known)
+}
+
+/// Colours are stored times alpha (OpenEXR, "Interpreting OpenEXR files"): divides by it. An alpha that is 0 everywhere says
+/// nothing if there are colours.
+fn cover(panorama: &mut Panorama, data: bool) {
+    let Some(alpha) = &panorama.known else { return };
+    if alpha.iter().all(|a| *a >= 1.0) {
+        panorama.known = None;
+        return;
+    }
+    let lit = || panorama.pixels.iter().any(|p| *p != [0.0; 3]);
+    if alpha.iter().all(|a| *a == 0.0) && lit() {
+        panorama
+            .notes
+            .push("its alpha channel is 0 everywhere although there are colours: it is ignored".to_owned());
+        panorama.known = None;
+        return;
+    }
+    let Some(alpha) = &mut panorama.known else { return };
+    panorama.pixels.par_iter_mut().zip(alpha).for_each(|(pixel, alpha)| {
+        // NaN is nothing known
+        *alpha = if *alpha > 0.0 { alpha.min(1.0) } else { 0.0 };
+        if *alpha == 0.0 {
+            *pixel = [0.0; 3];
+        } else if !data {
+            *pixel = pixel.map(|v| v / *alpha);
+        }
+    });
+}
+
+pub(super) fn attributes(file: impl Read + Seek, path: &Path) -> Result<BTreeMap<String, String>> {
+    guarded(|| {
+        let reader = exr::block::read(file, false).map_err(|e| wrap(e, path))?;
+        let mut all = BTreeMap::new();
+        for header in reader.headers().iter().rev() {
+            all.extend(text(header));
+        }
+        Ok(all)
+    })
+}
+
+/// Some damaged files make the decoder panic instead of returning an error; that must not reach the caller.
+fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|_| Err(Error::invalid("damaged EXR file: its decoder gave up on it")))
+}
+
+/// Checks everything the header says that the pixels will be allocated by.
+fn judge(header: &Header, options: &ReadOptions) -> Result<Equirect> {
+    if header.own_attributes.environment_map == Some(EnvironmentMap::Cube) {
+        return Err(Error::unsupported(
+            "a cube map (envmap = cube); convert it to a latitude-longitude panorama",
+        ));
+    }
+    if header.deep {
+        return Err(Error::unsupported("deep EXR images are not read"));
+    }
+    let Vec2(width, height) = header.shared_attributes.display_window.size;
+    let grid = options.check(width, height)?;
+    let Vec2(data_width, _) = header.layer_size;
+    let (block_width, block_height) = match header.blocks {
+        BlockDescription::ScanLines => (data_width, header.compression.scan_lines_per_block()),
+        BlockDescription::Tiles(tiles) => (tiles.tile_size.0, tiles.tile_size.1),
+    };
+    let bytes =
+        (block_width.checked_mul(block_height)).and_then(|n| n.checked_mul(header.channels.bytes_per_pixel));
+    if bytes.is_none_or(|n| n > MAX_EXR_BLOCK_BYTES) || block_width == 0 || block_height == 0 {
+        return Err(Error::invalid(format!(
+            "blocks of {block_width} × {block_height} pixels are not plausible"
+        )));
+    }
+    Ok(grid)
+}
+
+/// Every part is walked through when chunks are looked up, so each must be of a plausible size.
+fn judge_parts(headers: &[Header], options: &ReadOptions) -> Result<()> {
+    let any = ReadOptions { any_aspect: true, ..options.clone() };
+    if headers.len() > MAX_EXR_PARTS || headers.iter().any(|h| h.channels.list.len() > MAX_EXR_CHANNELS) {
+        return Err(Error::invalid("more parts or channels than a panorama has"));
+    }
+    for Vec2(width, height) in headers.iter().map(|header| header.layer_size) {
+        any.check(width, height).map_err(|e| Error::invalid(format!("data window: {e}")))?;
+    }
+    let chunks = headers.iter().fold(0_u64, |sum, header| sum.saturating_add(header.chunk_count as u64));
+    at_most("blocks", chunks, MAX_EXR_CHUNKS as u64)?;
+    Ok(())
+}
+
+/// Every text attribute of a part, the standard ones under their standard names.
+fn text(header: &Header) -> BTreeMap<String, String> {
+    let own = header.own_attributes.other.iter().chain(&header.shared_attributes.other);
+    let mut all: BTreeMap<String, String> = own
+        .filter_map(|(name, value)| match value {
+            AttributeValue::Text(text) => Some((utf8(name), utf8(text))),
+            _ => None,
+        })
+        .collect();
+    let attributes = &header.own_attributes;
+    let standard = [
+        ("software", &attributes.software_name),
+        ("comments", &attributes.comments),
+        ("owner", &attributes.owner),
+        ("capDate", &attributes.capture_date),
+    ];
+    for (name, value) in standard {
+        if let Some(value) = value {
+            all.insert(name.to_owned(), utf8(value));
+        }
+    }
+    join(all)
+}
+
+/// EXR text is bytes without an encoding.
+fn utf8(text: &Text) -> String {
+    String::from_utf8_lossy(text.as_slice()).into_owned()
+}
+
+fn wrap(error: exr::error::Error, path: &Path) -> Error {
+    match error {
+        exr::error::Error::NotSupported(what) => Error::unsupported(format!("EXR: {what}")),
+        exr::error::Error::Invalid(what) => Error::invalid(format!("damaged or truncated EXR file: {what}")),
+        exr::error::Error::Io(e) => Error::io(path, "read", e),
+        exr::error::Error::Aborted => Error::invalid("reading the EXR file was given up"),
+    }
+}

@@ -1,0 +1,81 @@
+//! XMP packets (ISO 16684-1): the properties of two namespaces, as attributes or as elements.
+//!
+//! A packet is written by few programs in few ways, so names are looked for without building a tree; what is not found counts as
+//! not said.
+
+/// Google's description of panoramas ("Photo Sphere XMP").
+pub(super) const GPANO: &str = "http://ns.google.com/photos/1.0/panorama/";
+/// Adobe's gain map specification 1.0.
+pub(super) const GAIN_MAP: &str = "http://ns.adobe.com/hdr-gain-map/1.0/";
+/// Apple's gain maps.
+pub(super) const APPLE_GAIN_MAP: &str = "http://ns.apple.com/HDRGainMap/1.0/";
+
+/// One namespace of a packet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Namespace<'a> {
+    packet: &'a str,
+    prefix: &'a str,
+}
+
+impl<'a> Namespace<'a> {
+    /// Nothing if the packet does not name it.
+    pub(super) fn find(packet: &'a str, uri: &str) -> Option<Self> {
+        let at = packet.match_indices(uri).find_map(|(at, _)| {
+            let closed = packet[at + uri.len()..].starts_with(['"', '\'']);
+            let before = packet[..at].strip_suffix(['"', '\''])?.trim_end().strip_suffix('=')?.trim_end();
+            let prefix = &before[before.rfind("xmlns:")? + "xmlns:".len()..];
+            let is_name =
+                !prefix.is_empty() && prefix.chars().all(|c| c.is_alphanumeric() || "-_.".contains(c));
+            (closed && is_name).then_some(prefix)
+        });
+        at.map(|prefix| Self { packet, prefix })
+    }
+
+    /// The text of a property.
+    pub(super) fn text(&self, name: &str) -> Option<&'a str> {
+        let full = format!("{}:{name}", self.prefix);
+        self.packet.match_indices(&full).find_map(|(at, _)| {
+            let before = self.packet[..at].chars().next_back()?;
+            let after = &self.packet[at + full.len()..];
+            if before == '<' {
+                let (_, content) = after.split_once('>').filter(|(tag, _)| tag.trim().is_empty())?;
+                return content.find(&format!("</{full}")).map(|end| content[..end].trim());
+            }
+            let value = after.trim_start().strip_prefix('=')?.trim_start();
+            let quote = value.chars().next().filter(|q| before.is_whitespace() && ['"', '\''].contains(q))?;
+            value[1..].split(quote).next().map(str::trim)
+        })
+    }
+
+    /// Its numbers: one, or those of a list; nothing where one of them is none.
+    pub(super) fn numbers(&self, name: &str) -> Option<Vec<f64>> {
+        // list items stand between tags
+        let words = self.text(name)?.split('<').filter_map(|part| part.split('>').next_back()).map(str::trim);
+        let numbers: Option<Vec<f64>> = words.filter(|w| !w.is_empty()).map(|w| w.parse().ok()).collect();
+        numbers.filter(|n| !n.is_empty() && n.iter().all(|v| v.is_finite()))
+    }
+
+    /// One number.
+    pub(super) fn number(&self, name: &str) -> Option<f64> {
+        self.numbers(name).and_then(|numbers| numbers.first().copied())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attributes_elements_and_lists() {
+        let packet = r#"<rdf:Description xmlns:g = 'http://ns.adobe.com/hdr-gain-map/1.0/' g:Version="1.0" g:GainMapMin = '-0.5'>
+            <g:GainMapMax><rdf:Seq><rdf:li>1</rdf:li><rdf:li> 2.5</rdf:li></rdf:Seq></g:GainMapMax><g:Gamma>3</g:Gamma>
+            <g:Empty/><g:Text>abc</g:Text></rdf:Description>"#;
+        let gain = Namespace::find(packet, GAIN_MAP).unwrap();
+        assert_eq!(gain.number("GainMapMin"), Some(-0.5));
+        assert_eq!(gain.numbers("GainMapMax"), Some(vec![1.0, 2.5]));
+        assert_eq!((gain.number("Gamma"), gain.text("Text")), (Some(3.0), Some("abc")));
+        assert_eq!((gain.number("Gam"), gain.number("Empty"), gain.number("Text")), (None, None, None));
+        assert!(Namespace::find(packet, GPANO).is_none());
+        assert!(Namespace::find("http://ns.google.com/photos/1.0/panorama/", GPANO).is_none());
+    }
+}
