@@ -2,7 +2,7 @@
 //!
 //! | here | crate | feature |
 //! |---|---|---|
-//! | [`sphere`], [`latent`], [`model`], [`field`] | veni-light: what a renderer embeds | |
+//! | [`sphere`], [`latent`], [`model`], [`field`], [`light`] | veni-light: what a renderer embeds | |
 //! | `gpu` | veni-gpu: the decoder as WGSL compute | `gpu` |
 //! | `nn`, `vae`, `train`, `fit`, `data`, `panorama`, `synth` | veni-core and what stands below it | `learn` |
 //! | `eval` | veni-eval: protocols, baselines | `learn` |

@@ -27,5 +27,5 @@ pub use loaded::LoadedModel;
 pub use veni_data::{self as data, expand, prepare};
 pub use veni_fit::shade;
 pub use veni_image as panorama;
-pub use veni_light::{Error, Result, error, field, latent, model, output, progress, random, sphere};
+pub use veni_light::{Error, Result, error, field, latent, light, model, output, progress, random, sphere};
 pub use veni_synth as synth;

@@ -10,8 +10,6 @@ pub mod mutate;
 #[cfg(feature = "onnx")]
 mod network;
 mod obj;
-#[path = "obj_report.rs"]
-mod report;
 #[cfg(feature = "learn")]
 mod runs;
 pub mod watch;

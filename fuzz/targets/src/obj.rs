@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use super::{Target, report, untouched};
+use super::{Target, untouched};
 
-#[path = "../../../crates/veni-cli/src/commands/render_probe/shape.rs"]
+#[path = "../../../crates/veni-cli/src/commands/render_probe/obj.rs"]
 #[allow(dead_code, unreachable_pub, missing_docs, reason = "what of it reads files is run")]
-mod shape;
+mod reader;
 
 pub(super) const TARGETS: &[Target] = &[Target { name: "obj", run: mesh, seeds: meshes, repair: untouched }];
 
 fn mesh(path: &Path) -> bool {
-    shape::mesh(path, shape::Up::Y, [30.0, 20.0], [16, 16], report::Report).is_ok()
+    reader::read(path, reader::Up::Y).is_ok()
 }
 
 fn meshes() -> Vec<Vec<u8>> {

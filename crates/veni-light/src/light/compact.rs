@@ -82,6 +82,11 @@ impl CompactLight {
     /// Angular radius of the sun as seen from the earth, radians: 0.2665°.
     pub const SUN_RADIUS: f32 = 0.2665 * std::f32::consts::PI / 180.0;
 
+    /// Discs of a smaller radius are points, radians.
+    const SMALL: f32 = 1e-2;
+    /// Points of a disc that is cut.
+    const POINTS: usize = 64;
+
     /// Azimuth in radians, counter-clockwise from +x seen from above, in (−π, π].
     pub fn azimuth(&self) -> f32 {
         self.direction[1].atan2(self.direction[0])
@@ -103,6 +108,37 @@ impl CompactLight {
     /// Radiance of the disc above what surrounds it, E⊥ / Ω. Infinite for a radius of 0.
     pub fn radiance(&self) -> [f32; 3] {
         self.irradiance.map(|e| e / self.solid_angle())
+    }
+
+    /// Irradiance of a surface with this unit normal, the part of the disc below its horizon left out: E⊥ times the mean of
+    /// max(0, n·d) over the disc.
+    pub fn irradiance_on(&self, normal: [f32; 3]) -> [f32; 3] {
+        let cosine: f32 = self.direction.iter().zip(normal).map(|(a, b)| a * b).sum();
+        let mean = if cosine.abs() > self.radius.sin() || self.radius < Self::SMALL {
+            // all or nothing of it is above: the mean of the cosine over a disc is cos² (r/2) that of its middle
+            let half = (0.5 * self.radius).cos();
+            half * half * cosine.max(0.0)
+        } else {
+            self.cut(normal)
+        };
+        self.irradiance.map(|e| e * mean)
+    }
+
+    /// The same at the horizon, over points spread evenly.
+    fn cut(&self, normal: [f32; 3]) -> f32 {
+        let [x, y, z] = self.direction;
+        let across = if z.abs() < 0.9 { [-y, x, 0.0] } else { [0.0, -z, y] };
+        let length = across.iter().map(|c| c * c).sum::<f32>().sqrt();
+        let u = across.map(|c| c / length);
+        let v = [y * u[2] - z * u[1], z * u[0] - x * u[2], x * u[1] - y * u[0]];
+        let [d, a, b] = [self.direction, u, v].map(|w| w.iter().zip(normal).map(|(w, n)| w * n).sum::<f32>());
+        let points = (0..Self::POINTS).map(|k| {
+            let cos = 1.0 - (1.0 - self.radius.cos()) * (k as f32 + 0.5) / Self::POINTS as f32;
+            // the golden angle
+            let (sin_k, cos_k) = (2.399_963 * k as f32).sin_cos();
+            (cos * d + (1.0 - cos * cos).max(0.0).sqrt() * (cos_k * a + sin_k * b)).max(0.0)
+        });
+        points.sum::<f32>() / Self::POINTS as f32
     }
 
     /// The same light after a turn by `angle` radians about z, counter-clockwise seen from above.
@@ -138,6 +174,20 @@ mod tests {
         let turned = light.turned(1.0);
         assert!((turned.azimuth() - 1.0).abs() < 1e-6);
         assert!((turned.elevation() - light.elevation()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_wide_light_reaches_behind_the_edge() {
+        let light = CompactLight { radius: 0.3, ..light([0.6, 0.0, 0.8]) };
+        let facing = light.irradiance_on(light.direction)[0];
+        assert!((facing / (3.0 * 0.15f32.cos().powi(2)) - 1.0).abs() < 1e-5, "{facing}");
+        // a surface whose horizon halves the disc: (2/3π) sin r of it, to third order
+        let half = light.irradiance_on([0.8, 0.0, -0.6])[0];
+        let expected = 3.0 * 2.0 * 0.3f32.sin() / (3.0 * std::f32::consts::PI);
+        assert!((half / expected - 1.0).abs() < 0.03, "{half} {expected}");
+        assert_eq!(light.irradiance_on([-0.6, 0.0, -0.8]), [0.0; 3]);
+        let point = CompactLight { radius: 0.0, ..light };
+        assert_eq!(point.irradiance_on([0.8, 0.0, -0.6])[0].max(1e-6), 1e-6);
     }
 
     #[test]

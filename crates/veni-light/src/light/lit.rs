@@ -191,7 +191,7 @@ impl Light {
         self.lights.iter().fold(self.harmonics.clone(), |sum, light| sum.plus(&Sh::of_light(light)))
     }
 
-    /// Irradiance of a surface with this unit normal: the lights as points, the rest summed over means of at most 256 columns.
+    /// Irradiance of a surface with this unit normal: the lights as discs, the rest summed over means of at most 256 columns.
     pub fn irradiance(&self, normal: [f32; 3]) -> [f32; 3] {
         let (sin, cos) = self.angle.sin_cos();
         let [x, y, z] = normal.map(f64::from);
@@ -205,8 +205,8 @@ impl Light {
             sum = [0, 1, 2].map(|c| sum[c] + weight * f64::from(cell.radiance[c]));
         }
         for light in &self.lights {
-            let cosine: f64 = light.direction.iter().zip(normal).map(|(d, n)| f64::from(d * n)).sum();
-            sum = [0, 1, 2].map(|c| sum[c] + cosine.max(0.0) * f64::from(light.irradiance[c]));
+            let on = light.irradiance_on(normal);
+            sum = [0, 1, 2].map(|c| sum[c] + f64::from(on[c]));
         }
         sum.map(|v| v as f32)
     }

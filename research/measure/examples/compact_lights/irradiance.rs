@@ -7,7 +7,7 @@ use veni_light::sphere::Equirect;
 use super::panorama;
 
 /// Normals: the pixel centres of this grid, by solid angle.
-const NORMALS: Equirect = Equirect { width: 32, height: 16 };
+const NORMALS: Equirect = Equirect { width: 16, height: 8 };
 
 pub(crate) fn run(files: &[&str]) -> Result<()> {
     let mut columns: [Vec<f64>; 4] = Default::default();
@@ -16,7 +16,8 @@ pub(crate) fn run(files: &[&str]) -> Result<()> {
     for file in files {
         let panorama = panorama(file)?;
         let map = panorama.environment()?;
-        let truth = |n: [f32; 3]| exact(map, n);
+        let directions = map.grid().directions();
+        let truth = |n: [f32; 3]| exact(map, &directions, n);
         let whole = Sh::<2>::of(map).irradiance();
         let light = Light::of(map);
         let rest = light.residual_sh().irradiance();
@@ -28,8 +29,8 @@ pub(crate) fn run(files: &[&str]) -> Result<()> {
         let with_lamps = with_lamps.irradiance();
         let sum = |base: [f64; 3], lights: &[veni_light::light::CompactLight], n: [f32; 3]| {
             lights.iter().fold(base, |sum, l| {
-                let cosine: f32 = l.direction.iter().zip(n).map(|(a, b)| a * b).sum();
-                [0, 1, 2].map(|c| sum[c] + f64::from(cosine.max(0.0) * l.irradiance[c]))
+                let on = l.irradiance_on(n);
+                [0, 1, 2].map(|c| sum[c] + f64::from(on[c]))
             })
         };
         let suns = &light.lights()[..usize::from(light.sun().is_some())];
@@ -76,13 +77,14 @@ fn error(truth: &dyn Fn([f32; 3]) -> [f64; 3], found: &dyn Fn([f32; 3]) -> [f64;
 }
 
 /// Σ ω L max(0, n·d) over every pixel.
-pub(crate) fn exact(map: EnvironmentMap<'_>, normal: [f32; 3]) -> [f64; 3] {
+pub(crate) fn exact(map: EnvironmentMap<'_>, directions: &[[f32; 3]], normal: [f32; 3]) -> [f64; 3] {
     let grid = map.grid();
     let mut sum = [0.0; 3];
     for row in 0..grid.height {
         let solid_angle = grid.solid_angle(row);
         for column in 0..grid.width {
-            let cosine: f32 = grid.direction(column, row).iter().zip(normal).map(|(a, b)| a * b).sum();
+            let direction = directions[row * grid.width + column];
+            let cosine: f32 = direction.iter().zip(normal).map(|(a, b)| a * b).sum();
             if cosine > 0.0 {
                 let pixel = map.pixels()[row * grid.width + column];
                 sum = [0, 1, 2].map(|c| sum[c] + solid_angle * f64::from(cosine) * f64::from(pixel[c]));

@@ -63,15 +63,11 @@ fn error(field: &[[f32; 3]], lights: &[CompactLight], truth: EnvironmentMap<'_>)
         .collect();
     let y = |e: [f64; 3]| f64::from(luminance(e.map(|v| v as f32)));
     let square = |way: &[f32; 3]| {
-        let field = EnvironmentMap::new(GRID, field).map(|map| y(exact(map, *way))).unwrap_or(f64::NAN);
-        let lights: f32 = lights
-            .iter()
-            .map(|l| {
-                let cosine: f32 = l.direction.iter().zip(way).map(|(a, b)| a * b).sum();
-                cosine.max(0.0) * luminance(l.irradiance)
-            })
-            .sum();
-        ((field + f64::from(lights)) / y(exact(truth, *way))).ln().powi(2)
+        let field = EnvironmentMap::new(GRID, field)
+            .map(|map| y(exact(map, &GRID.directions(), *way)))
+            .unwrap_or(f64::NAN);
+        let lights: f32 = lights.iter().map(|l| luminance(l.irradiance_on(*way))).sum();
+        ((field + f64::from(lights)) / y(exact(truth, &truth.grid().directions(), *way))).ln().powi(2)
     };
     (ways.iter().map(square).sum::<f64>() / ways.len() as f64).sqrt()
 }

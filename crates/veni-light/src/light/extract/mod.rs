@@ -69,6 +69,8 @@ pub(super) struct Extraction {
 #[derive(Clone, Copy, Debug)]
 struct Found {
     light: CompactLight,
+    /// The middle of its brightest part.
+    core: [f32; 3],
     /// Its peak luminance over that of its background.
     contrast: f64,
     /// Its peak luminance.
@@ -122,6 +124,11 @@ impl Extraction {
         sun = sun.or_else(|| sun::choose(&found, choice, self.coarsest()));
         if let Some(at) = sun {
             found[..=at].rotate_right(1);
+            // shadows of the sun fall by its brightest part, whatever glows around it
+            let Found { light, core, .. } = &mut found[0];
+            if light.kind == Kind::Glow {
+                light.direction = *core;
+            }
         }
         let lights = found.into_iter().map(|f| f.light).collect();
         let coarse = self.levels.swap_remove(self.levels.len() - 1).keep(&self.pixels);
@@ -197,12 +204,15 @@ impl Extraction {
         let facing = self.facing(measured.centre);
         let (peak, clipped) = shape::top(full, measured);
         let mut energy = [0.0; 3];
+        let mut moment = [0.0; 3];
         let mut changed = Vec::new();
         full.cap(measured.centre, measured.scale, |cell| {
             let rest = [0, 1, 2].map(|c| cell.radiance[c].min(measured.background[c]));
             for c in 0..3 {
                 energy[c] += cell.solid_angle * (f64::from(cell.radiance[c]) - f64::from(rest[c]));
             }
+            let taken = f64::from(luminance(cell.radiance)) - f64::from(luminance(rest));
+            moment = [0, 1, 2].map(|c| moment[c] + cell.solid_angle * taken * cell.direction[c]);
             changed.push((cell.index, rest));
         });
         let pixel = self.levels[0].cell_angle();
@@ -211,8 +221,21 @@ impl Extraction {
         // of what is wide, one pixel says little
         let wide = measured.scale > FINE.to_radians();
         let over = if wide { measured.peak } else { peak - measured.background_luminance() };
-        let (radius, radius_source) = shape::radius(luminance_of(energy), over, spread, pixel);
-        let direction = if angle(core, measured.centre) < measured.scale { core } else { measured.centre };
+        let (mut radius, radius_source) = shape::radius(luminance_of(energy), over, spread, pixel);
+        let core = if angle(core, measured.centre) < measured.scale { core } else { measured.centre };
+        // the first moment of what is wide lights surfaces as it does
+        let kind = Kind::of(radius as f32);
+        let mut direction = core;
+        if let Some(middle) = vector::normalised(moment)
+            && kind != Kind::Disc
+        {
+            direction = middle;
+            if kind == Kind::Lobe {
+                // of a disc the mean of the cosine is (1 + cos r)/2
+                let mean = dot(moment, middle) / luminance_of(energy);
+                radius = (2.0 * mean - 1.0).clamp(-1.0, 1.0).acos();
+            }
+        }
         for (index, rest) in changed {
             self.pixels[index] = rest;
         }
@@ -225,11 +248,11 @@ impl Extraction {
             irradiance: energy.map(|e| e as f32),
             radius: radius as f32,
             radius_source,
-            kind: Kind::of(radius as f32),
+            kind,
             share: (luminance_of(energy) / facing).min(1.0) as f32,
             clipped,
         };
-        Found { light, contrast: measured.contrast(), peak }
+        Found { light, core: core.map(|c| c as f32), contrast: measured.contrast(), peak }
     }
 
     /// Irradiance (luminance) of a surface that faces `direction`.
