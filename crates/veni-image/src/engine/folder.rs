@@ -53,17 +53,17 @@ impl Folder {
         Ok(())
     }
 
-    /// A panorama as EXR: halves where they hold it, else floats.
-    pub(super) fn add_panorama(&mut self, name: &str, panorama: &Panorama) -> Result<()> {
-        self.add_exr(name, panorama, true)
+    /// An image of radiance as EXR: halves where they hold it, else floats.
+    pub(super) fn add_radiance(&mut self, name: &str, image: &Panorama) -> Result<()> {
+        self.add_exr(name, image, true)
     }
 
-    /// An image as EXR; `latlong` if it is a panorama.
-    pub(super) fn add_exr(&mut self, name: &str, image: &Panorama, latlong: bool) -> Result<()> {
+    /// An image as EXR; `colour` unless its values are numbers of another kind.
+    pub(super) fn add_exr(&mut self, name: &str, image: &Panorama, colour: bool) -> Result<()> {
         let brightest = image.pixels().as_flattened().iter().fold(0f32, |a, b| a.max(*b));
         let precision = if brightest < 65504.0 { Precision::Half } else { Precision::Float };
         let options = WriteOptions {
-            latlong,
+            colour,
             half_range: HalfRange::Refuse,
             ..WriteOptions::new(WriteFormat::Exr(precision))
         };
