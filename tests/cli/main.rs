@@ -31,6 +31,7 @@ mod inspect;
 mod large_sets;
 #[cfg(feature = "pretrained")]
 mod light;
+mod limits;
 #[cfg(feature = "onnx")]
 #[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-data's tests use the rest of it")]

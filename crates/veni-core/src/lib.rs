@@ -17,6 +17,7 @@
 
 pub mod fit;
 pub mod import;
+pub mod limits;
 mod loaded;
 pub mod nn;
 pub mod train;

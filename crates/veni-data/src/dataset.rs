@@ -7,8 +7,8 @@ use std::sync::Arc;
 use crate::parallel::parallel;
 use crate::pixels::Pixels;
 use crate::{Error, Result};
-use veni_image::Panorama;
 use veni_image::exposure::centre_exposure;
+use veni_image::{Budget, Panorama, ReadOptions};
 use veni_light::progress::{Observer, Silent};
 use veni_light::sphere::Equirect;
 
@@ -66,8 +66,8 @@ impl Dataset {
         Self { grid, items: Arc::new(items) }
     }
 
-    /// Reads, cleans and resamples files, in parallel; the order is kept. As many files as there are processors are
-    /// in memory at their full size at a time.
+    /// Reads, cleans and resamples files, in parallel; the order is kept. At most as many files as there are processors are
+    /// in memory at their full size at a time, fewer where their pixels are more than [`Budget::shared`].
     ///
     /// # Errors
     /// The first file (in order) that cannot be read, by name.
@@ -128,7 +128,9 @@ pub(super) fn load(
     observer: &dyn Observer,
 ) -> Result<Vec<Item>> {
     parallel(files.len(), |at| {
+        let claim = Budget::shared().claim_file(&files[at], &ReadOptions::default());
         let item = keep(at, read_item(&files[at], grid)?)?;
+        drop(claim);
         observer.advance(1);
         Ok(item)
     })

@@ -8,6 +8,7 @@ pub mod coarsen;
 mod dataset;
 pub mod expand;
 mod fold;
+pub mod limits;
 pub mod parallel;
 mod pixel_storage;
 mod pixels;

@@ -4,8 +4,6 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 
-use crate::Result;
-
 /// f(0), …, f(count − 1), computed by as many threads as there are processors, begun in this order. An error ends the
 /// work; of several the first in order is returned.
 ///
@@ -14,10 +12,13 @@ use crate::Result;
 ///
 /// # Errors
 /// The first error of `f`, in the order of the items.
-pub fn parallel<T: Send>(count: usize, f: impl Fn(usize) -> Result<T> + Sync) -> Result<Vec<T>> {
+pub fn parallel<T: Send, E: Send>(
+    count: usize,
+    f: impl Fn(usize) -> Result<T, E> + Sync,
+) -> Result<Vec<T>, E> {
     let threads = thread::available_parallelism().map_or(1, usize::from).min(count);
     let (next, failed) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let results = Mutex::new((0..count).map(|_| None).collect::<Vec<Option<Result<T>>>>());
+    let results = Mutex::new((0..count).map(|_| None).collect::<Vec<Option<Result<T, E>>>>());
     thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
@@ -46,8 +47,9 @@ mod tests {
 
     #[test]
     fn order_is_kept_and_errors_come_through() {
-        assert_eq!(parallel(100, |i| Ok(i * i)).unwrap(), (0..100).map(|i| i * i).collect::<Vec<_>>());
-        assert_eq!(parallel(0, |_| Ok(1)).unwrap(), Vec::<i32>::new());
+        let all = parallel(100, |i| Ok::<_, Error>(i * i));
+        assert_eq!(all.unwrap(), (0..100).map(|i| i * i).collect::<Vec<_>>());
+        assert_eq!(parallel(0, |_| Ok::<_, Error>(1)).unwrap(), Vec::<i32>::new());
         let failing = parallel(100, |i| if i == 7 { Err(Error::invalid("seven")) } else { Ok(i) });
         assert_eq!(failing.unwrap_err().to_string(), "seven");
     }

@@ -13,15 +13,19 @@
 //! | other sizes, turned, mirrored | [`Panorama::resample`], [`Panorama::turn`], [`Panorama::mirror`] |
 //! | what the model works on | [`Panorama::log`], [`Panorama::mean_log_luminance`], [`exposure`] |
 //! | to a screen | [`tonemap`], [`Sheet`] |
+//! | what large or damaged files may take | [`limits`], [`Budget`], [`memory`] |
 //! | how close two panoramas are | [`metrics`] |
 //! | EXR, `.hdr`, PNG files, whole or row by row | [`Panorama::write`], [`write_rows`] |
 
 #![forbid(unsafe_code)]
 
+mod budget;
 mod colour;
 pub mod engine;
 mod equal_area;
 pub mod exposure;
+pub mod limits;
+pub mod memory;
 pub mod metrics;
 mod numbered;
 mod panorama;
@@ -42,11 +46,12 @@ mod light_tests;
 
 pub use veni_light::{Error, Result};
 
+pub use budget::{Budget, Claim};
 pub use colour::{LUMINANCE, luminance};
 pub use panorama::{LOG_FLOOR, Panorama};
 pub use picture::{Picture, read_mask};
 pub use provenance::{PIXEL_DIGEST, Provenance};
-pub use read::{DEFAULT_MAX_PIXELS, LdrPanorama, ReadOptions, Transfer, attributes};
+pub use read::{DEFAULT_MAX_PIXELS, LdrPanorama, ReadOptions, Transfer, attributes, peak_bytes};
 pub use sanitise::{Sanitised, log_reference, sanitise_values};
 pub use sheet::{Sheet, write_png};
 pub use write::{

@@ -12,6 +12,7 @@
 //! | [`cholesky`] | small dense systems of equations |
 //! | [`digest`] | content as one short name |
 //! | [`progress`] | who is told how far long work has come |
+//! | [`limits`] | how large a file may be, and what it may ask for |
 //! | [`output`] | files that are written beside their target and renamed |
 //!
 //! # Glossary
@@ -46,6 +47,7 @@ pub mod error;
 pub mod field;
 pub mod latent;
 pub mod light;
+pub mod limits;
 pub mod model;
 pub mod output;
 pub mod progress;

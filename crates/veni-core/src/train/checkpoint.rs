@@ -3,15 +3,16 @@
 //! Tensors are [`Optimiser::state`](crate::train::optimiser::Optimiser::state); everything random is named by
 //! its step, so the step count is all that is needed beside them. The metadata entry `veni-checkpoint` is JSON.
 
-use std::fs;
 use std::io::Write;
 use std::path::Path;
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
+use crate::limits::MAX_CHECKPOINT_BYTES;
 use crate::vae::weights::Weights;
 use crate::{Error, Result};
+use veni_light::limits::read_file;
 use veni_light::model::Array;
 use veni_light::output::{Overwrite, write_atomic};
 
@@ -73,7 +74,7 @@ pub fn save(path: &Path, state: &Weights, info: &CheckpointInfo) -> Result<()> {
 /// [`Error::Io`] if it cannot be read; [`Error::Invalid`] if it is damaged; [`Error::Unsupported`] for a format
 /// of another version. All name the file.
 pub fn load(path: &Path) -> Result<(Weights, CheckpointInfo)> {
-    let bytes = fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let bytes = read_file(path, "a checkpoint", MAX_CHECKPOINT_BYTES)?;
     parse(&bytes).map_err(|e| e.in_file(path))
 }
 
@@ -113,6 +114,7 @@ fn little_endian(values: &[f32]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn what_is_saved_comes_back_to_the_bit_and_damage_is_named() {

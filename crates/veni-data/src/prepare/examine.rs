@@ -7,8 +7,9 @@ use super::Fingerprint;
 use crate::expand::network::{Estimate, Network, NetworkOptions};
 use crate::expand::{Expand, ExpandOptions, Sun};
 use crate::{Error, Result};
+use veni_image::limits::{EXAMINE_BYTES_PER_PIXEL, READ_BYTES_PER_PIXEL};
 use veni_image::tonemap::quantile;
-use veni_image::{LdrPanorama, Panorama, ReadOptions, Sanitised, luminance};
+use veni_image::{LdrPanorama, Panorama, ReadOptions, Sanitised, luminance, memory};
 use veni_light::sphere::Equirect;
 
 /// More pixels than this that are not numbers, and a file counts as broken.
@@ -128,6 +129,8 @@ fn read(path: &Path, config: &PrepareConfig) -> Result<(Panorama, Option<Expansi
 
 impl Expander {
     fn expand(&self, ldr: &LdrPanorama) -> Result<(Panorama, Expansion)> {
+        // on top of what the display values take
+        memory::check(ldr.grid().len() as u64 * (EXAMINE_BYTES_PER_PIXEL - READ_BYTES_PER_PIXEL))?;
         match self {
             Self::Fitted(options) => {
                 let done = ldr.expand(options);

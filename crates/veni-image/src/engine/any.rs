@@ -18,17 +18,14 @@ pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer)
     let cubes = sky.prefilter.specular(levels, CubeAxes::GLTF, |_| observer.advance(1));
     let mut roughness = Vec::new();
     for (k, cube) in cubes.iter().enumerate() {
-        folder.add_radiance(&format!("specular_{k}.exr"), &stacked(cube))?;
+        folder.add_exr(&format!("specular_{k}.exr"), &stacked(cube))?;
         roughness.push(levels.roughness(k).to_string());
     }
-    folder.add_radiance(
-        "diffuse.exr",
-        &stacked(&sky.prefilter.diffuse(DIFFUSE.min(sky.size), CubeAxes::GLTF)),
-    )?;
+    folder.add_exr("diffuse.exr", &stacked(&sky.prefilter.diffuse(DIFFUSE.min(sky.size), CubeAxes::GLTF)))?;
     observer.advance(1);
     let dfg = Dfg::new(DFG).values().iter().map(|[x, y]| [*x, *y, 0.0]).collect();
-    folder.add_exr("dfg.exr", &Panorama::new(Equirect::new(DFG, DFG), dfg), false)?;
-    folder.add_radiance("sky.exr", sky.panorama)?;
+    folder.add_numbers("dfg.exr", &Panorama::new(Equirect::new(DFG, DFG), dfg))?;
+    folder.add_exr("sky.exr", sky.panorama)?;
     observer.advance(1);
     let sun = sky.sun.map_or("null".to_owned(), |sun| {
         format!(

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use veni_light::output::{Overwrite, process_token, write_atomic};
 
-use crate::{Error, HalfRange, Panorama, Precision, Result, WriteFormat, WriteOptions};
+use crate::{Error, HALF_ERROR, Panorama, Precision, Result, WriteFormat, WriteOptions, half_error};
 
 /// Files on their way into a folder: written beside it, then moved.
 pub(super) struct Folder {
@@ -53,20 +53,20 @@ impl Folder {
         Ok(())
     }
 
-    /// An image of radiance as EXR: halves where they hold it, else floats.
-    pub(super) fn add_radiance(&mut self, name: &str, image: &Panorama) -> Result<()> {
-        self.add_exr(name, image, true)
+    /// An image as EXR: in half precision where that keeps its values.
+    pub(super) fn add_exr(&mut self, name: &str, image: &Panorama) -> Result<()> {
+        self.add_values(name, image, true)
     }
 
-    /// An image as EXR; `colour` unless its values are numbers of another kind.
-    pub(super) fn add_exr(&mut self, name: &str, image: &Panorama, colour: bool) -> Result<()> {
-        let brightest = image.pixels().as_flattened().iter().fold(0f32, |a, b| a.max(*b));
-        let precision = if brightest < 65504.0 { Precision::Half } else { Precision::Float };
-        let options = WriteOptions {
-            colour,
-            half_range: HalfRange::Refuse,
-            ..WriteOptions::new(WriteFormat::Exr(precision))
-        };
+    /// The same of values that are no colours.
+    pub(super) fn add_numbers(&mut self, name: &str, image: &Panorama) -> Result<()> {
+        self.add_values(name, image, false)
+    }
+
+    fn add_values(&mut self, name: &str, image: &Panorama, colour: bool) -> Result<()> {
+        let keeps = half_error(image.pixels(), 1.0) <= HALF_ERROR;
+        let precision = if keeps { Precision::Half } else { Precision::Float };
+        let options = WriteOptions { colour, ..WriteOptions::new(WriteFormat::Exr(precision)) };
         image.write(self.staged.join(name), &options)?;
         self.names.push(name.to_owned());
         Ok(())

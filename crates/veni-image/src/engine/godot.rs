@@ -10,7 +10,7 @@ use crate::Result;
 use crate::tonemap::srgb;
 
 pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer) -> Result<()> {
-    folder.add_radiance("sky.exr", sky.panorama)?;
+    folder.add_exr("sky.exr", sky.panorama)?;
     observer.advance(1);
     // the turned sky's frame is Bevy's
     let sun = sky.sun.map(|sun| FramedSun::new(&sun, Frame::Bevy));

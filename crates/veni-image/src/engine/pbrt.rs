@@ -13,7 +13,7 @@ pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer)
     // as many pixels as the panorama
     let side = (sky.panorama.grid().len() as f64).sqrt().round().max(1.0) as usize;
     let image = Panorama::new(Equirect::new(side, side), square(sky.panorama.environment()?, side));
-    folder.add_radiance("sky_equiarea.exr", &image)?;
+    folder.add_exr("sky_equiarea.exr", &image)?;
     observer.advance(1);
     let sun = sky.sun.map(|sun| FramedSun::new(&sun, Frame::Blender));
     let light = sun.map_or(String::new(), |sun| {

@@ -15,7 +15,7 @@ pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer)
     let Some(levels) = Engine::Three.levels(sky.size) else { unreachable!("three.js looks up levels") };
     let cubes = sky.prefilter.specular(levels, CubeAxes::THREE, |_| observer.advance(1));
     folder.add("sky.ktx2", ktx2(&cubes, TexelFormat::Rgba16F)?)?;
-    folder.add_radiance("background.exr", sky.background)?;
+    folder.add_exr("background.exr", sky.background)?;
     observer.advance(1);
     let sun = sky.sun.map(|sun| FramedSun::new(&sun, Frame::Gltf));
     let light = sun.map_or(String::new(), |sun| {

@@ -9,7 +9,7 @@ use super::{Folder, Sky};
 use crate::Result;
 
 pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer) -> Result<()> {
-    folder.add_radiance("sky.exr", sky.panorama)?;
+    folder.add_exr("sky.exr", sky.panorama)?;
     observer.advance(1);
     let sun = sky.sun.map(|sun| FramedSun::new(&sun, Frame::OpenExr));
     let light = sun.map_or(String::new(), |sun| {

@@ -18,16 +18,14 @@ use rayon::prelude::*;
 
 use super::ReadOptions;
 use crate::colour::{Primaries, convert};
+use crate::limits::{MAX_EXR_BLOCK_BYTES, MAX_EXR_CHANNELS, MAX_EXR_CHUNKS, MAX_EXR_PARTS, at_most};
 use crate::numbered::join;
 use crate::{Error, Result};
 use crate::{Panorama, Provenance, RADIANCE_SCALE};
 
-/// Compressed blocks held at a time while decompressing on all cores.
+/// Blocks held at a time while decompressing on all cores, and their bytes where they are large.
 const BATCH: usize = 32;
-/// Parts, channels and tile area beyond these are no panorama but an attempt to exhaust memory.
-const MAX_PARTS: usize = 256;
-const MAX_CHANNELS: usize = 1024;
-const MAX_BLOCK_BYTES: usize = 1 << 30;
+const BATCH_BYTES: usize = 1 << 28;
 
 pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -> Result<Panorama> {
     guarded(|| {
@@ -118,7 +116,7 @@ fn judge(header: &Header, options: &ReadOptions) -> Result<veni_light::sphere::E
     };
     let bytes =
         (block_width.checked_mul(block_height)).and_then(|n| n.checked_mul(header.channels.bytes_per_pixel));
-    if bytes.is_none_or(|n| n > MAX_BLOCK_BYTES) || block_width == 0 || block_height == 0 {
+    if bytes.is_none_or(|n| n > MAX_EXR_BLOCK_BYTES) || block_width == 0 || block_height == 0 {
         return Err(Error::invalid(format!(
             "blocks of {block_width} × {block_height} pixels are not plausible"
         )));
@@ -138,12 +136,14 @@ struct Choice {
 /// Every part is walked through when chunks are looked up, so each must be of a plausible size.
 fn judge_parts(headers: &[Header], options: &ReadOptions) -> Result<()> {
     let any = ReadOptions { any_aspect: true, ..options.clone() };
-    if headers.len() > MAX_PARTS || headers.iter().any(|h| h.channels.list.len() > MAX_CHANNELS) {
+    if headers.len() > MAX_EXR_PARTS || headers.iter().any(|h| h.channels.list.len() > MAX_EXR_CHANNELS) {
         return Err(Error::invalid("more parts or channels than a panorama has"));
     }
     for Vec2(width, height) in headers.iter().map(|header| header.layer_size) {
         any.check(width, height).map_err(|e| Error::invalid(format!("data window: {e}")))?;
     }
+    let chunks = headers.iter().fold(0_u64, |sum, header| sum.saturating_add(header.chunk_count as u64));
+    at_most("blocks", chunks, MAX_EXR_CHUNKS as u64)?;
     Ok(())
 }
 
@@ -228,8 +228,10 @@ fn blocks(
         i64::from(header.own_attributes.layer_position.1) - i64::from(origin.1),
     ];
     let mut seen = HashSet::with_capacity(expected);
+    let together = (BATCH_BYTES / header.max_block_byte_size().max(1)).clamp(1, BATCH);
     loop {
-        let batch = chunks.by_ref().take(BATCH).collect::<Result<Vec<_>, _>>().map_err(|e| wrap(e, path))?;
+        let batch =
+            chunks.by_ref().take(together).collect::<Result<Vec<_>, _>>().map_err(|e| wrap(e, path))?;
         if batch.is_empty() {
             break;
         }

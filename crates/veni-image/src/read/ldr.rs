@@ -6,7 +6,7 @@ use std::path::Path;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
-use super::{LDR, ReadOptions, first_bytes, open, stands, unknown};
+use super::{LDR, ReadOptions, first_bytes, open, precheck, stands, unknown};
 use crate::panorama::Panorama;
 use crate::tonemap::srgb_to_linear;
 use crate::{Error, Result};
@@ -114,7 +114,7 @@ impl LdrPanorama {
 }
 
 /// The format that these first bytes begin, with its name.
-fn format(start: &[u8]) -> Option<(ImageFormat, &'static str)> {
+pub(super) fn format(start: &[u8]) -> Option<(ImageFormat, &'static str)> {
     let (.., format, name) = LDR.iter().find(|(at, magic, ..)| stands(start, *at, magic))?;
     // RIFF holds sound and video too
     let is_image = *format != ImageFormat::WebP || start.get(8..12) == Some(b"WEBP");
@@ -139,6 +139,7 @@ fn decode(path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
         ImageError::Unsupported(e) => Error::unsupported(format!("{name}: {e}")),
         other => Error::invalid(format!("damaged or truncated {name} file: {other}")),
     };
+    precheck::room(precheck::ldr(&mut file, path, format)?, options)?;
     if format == ImageFormat::Jpeg && !jpeg_ends(&mut file).map_err(|e| Error::io(path, "read", e))? {
         return Err(Error::invalid("truncated JPEG file"));
     }
@@ -181,22 +182,45 @@ fn on_its_side(orientation: Orientation) -> bool {
     matches!(orientation, Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH)
 }
 
-/// Display values of any sample layout, and their alpha.
+/// Display values of any sample layout, and their alpha. The image is read sample by sample: a copy in a common layout would
+/// take as much memory as the values.
 fn values(grid: Equirect, image: &DynamicImage) -> LdrPanorama {
+    use DynamicImage as D;
+    let byte = |v: u8| f32::from(v) / 255.0;
+    let word = |v: u16| f32::from(v) / 65535.0;
     let mut values = Vec::with_capacity(grid.len());
     let mut alpha = None;
     match image {
-        DynamicImage::ImageRgb8(rgb) => {
-            values.extend(rgb.pixels().map(|p| p.0.map(|v| f32::from(v) / 255.0)));
+        D::ImageLuma8(image) => values.extend(image.pixels().map(|p| [byte(p.0[0]); 3])),
+        D::ImageLuma16(image) => values.extend(image.pixels().map(|p| [word(p.0[0]); 3])),
+        D::ImageRgb8(image) => values.extend(image.pixels().map(|p| p.0.map(byte))),
+        D::ImageRgb16(image) => values.extend(image.pixels().map(|p| p.0.map(word))),
+        D::ImageLumaA8(image) => {
+            values.extend(image.pixels().map(|p| [byte(p.0[0]); 3]));
+            alpha = hidden(image.pixels().map(|p| p.0[1]), u8::MAX, byte);
+        }
+        D::ImageLumaA16(image) => {
+            values.extend(image.pixels().map(|p| [word(p.0[0]); 3]));
+            alpha = hidden(image.pixels().map(|p| p.0[1]), u16::MAX, word);
+        }
+        D::ImageRgba8(image) => {
+            values.extend(image.pixels().map(|p| [p.0[0], p.0[1], p.0[2]].map(byte)));
+            alpha = hidden(image.pixels().map(|p| p.0[3]), u8::MAX, byte);
         }
         other => {
             let rgba = other.to_rgba16();
-            let unit = |v: u16| f32::from(v) / 65535.0;
-            values.extend(rgba.pixels().map(|p| [p.0[0], p.0[1], p.0[2]].map(unit)));
-            if rgba.pixels().any(|p| p.0[3] < u16::MAX) {
-                alpha = Some(rgba.pixels().map(|p| unit(p.0[3])).collect());
-            }
+            values.extend(rgba.pixels().map(|p| [p.0[0], p.0[1], p.0[2]].map(word)));
+            alpha = hidden(rgba.pixels().map(|p| p.0[3]), u16::MAX, word);
         }
     }
     LdrPanorama { grid, values, alpha }
+}
+
+/// An alpha channel from 0 to 1, where it hides anything.
+fn hidden<T: PartialOrd + Copy>(
+    alpha: impl Iterator<Item = T> + Clone,
+    opaque: T,
+    unit: impl Fn(T) -> f32,
+) -> Option<Vec<f32>> {
+    alpha.clone().any(|a| a < opaque).then(|| alpha.map(unit).collect())
 }

@@ -7,23 +7,23 @@ mod hdr;
 mod ldr;
 #[cfg(test)]
 mod ldr_tests;
+mod precheck;
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
 use image::ImageFormat;
 
+use crate::limits::{EXAMINE_BYTES_PER_PIXEL, READ_BYTES_PER_PIXEL};
 use crate::panorama::Panorama;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 
 pub use ldr::{LdrPanorama, Transfer};
 
-/// The largest panorama that [`Panorama::read`] accepts: 2²⁸ pixels (a little over 23,000 × 11,500), which is
-/// 3 GiB of radiance. [`ReadOptions::max_pixels`] overrides it.
-pub const DEFAULT_MAX_PIXELS: usize = 1 << 28;
+pub use crate::limits::DEFAULT_MAX_PIXELS;
 
 /// What [`Panorama::read_with`] accepts.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -93,7 +93,9 @@ impl Panorama {
         let path = path.as_ref();
         let read = || -> Result<Self> {
             let mut file = open(path)?;
-            match kind(&mut file, path)? {
+            let kind = kind(&mut file, path)?;
+            precheck::room(declared(&mut file, path)?, options)?;
+            match kind {
                 Kind::Exr => exr::read(file, path, options),
                 Kind::Hdr { strict } => hdr::read(file, path, strict, options),
             }
@@ -134,6 +136,41 @@ pub fn attributes(path: impl AsRef<Path>) -> Result<BTreeMap<String, String>> {
         }
     };
     read().map_err(|e| e.in_file(path))
+}
+
+/// Bytes of memory that reading, expanding and examining a file takes at its peak, by the size that its header declares; no
+/// pixel is read. Nothing where it declares none, or more pixels than `options` allow: to read it is an error.
+///
+/// # Errors
+/// As [`Panorama::read_with`] and [`LdrPanorama::read_with`] where the header is concerned.
+pub fn peak_bytes(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Option<u64>> {
+    let path = path.as_ref();
+    let look = || {
+        let mut file = open(path)?;
+        let start = first_bytes(&mut file, path)?;
+        // radiance is not expanded
+        let each = if ldr::format(&start).is_some() { EXAMINE_BYTES_PER_PIXEL } else { READ_BYTES_PER_PIXEL };
+        Ok(precheck::peak(declared(&mut file, path)?, each, options))
+    };
+    look().map_err(|e: Error| e.in_file(path))
+}
+
+/// The size that the header of a file of any format declares; rewinds.
+fn declared(file: &mut (impl BufRead + Seek), path: &Path) -> Result<precheck::Size> {
+    let start = first_bytes(file, path)?;
+    let Some((format, _)) = ldr::format(&start) else {
+        return match kind(file, path)? {
+            Kind::Exr => precheck::exr(file, path),
+            Kind::Hdr { .. } => precheck::hdr(file, path),
+        };
+    };
+    #[cfg(feature = "avif")]
+    if format == ImageFormat::Avif {
+        let size = avif::declared(&mut *file, path)?;
+        file.rewind().map_err(|e| Error::io(path, "read", e))?;
+        return Ok(Some(size));
+    }
+    precheck::ldr(file, path, format)
 }
 
 fn open(path: &Path) -> Result<BufReader<File>> {
@@ -182,9 +219,11 @@ fn first_bytes(file: &mut (impl Read + Seek), path: &Path) -> Result<Vec<u8>> {
 fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
     let start = first_bytes(file, path)?;
     if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        precheck::exr(file, path)?;
         return Ok(Kind::Exr);
     }
     if start.starts_with(b"#?") {
+        precheck::hdr(file, path)?;
         return Ok(Kind::Hdr { strict: start.starts_with(b"#?RADIANCE") });
     }
     if let Some((.., format)) = LDR.iter().find(|(at, magic, ..)| stands(&start, *at, magic)) {

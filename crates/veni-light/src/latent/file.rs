@@ -3,18 +3,17 @@
 //! `vectors` is N triples [x, y, z]; `exposure` the natural log of the factor to radiance; `model` and `source`
 //! may be null or absent. The same text goes into the attribute of a baked panorama.
 
-use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::Latent;
+use crate::limits::read_text;
 use crate::output::{Overwrite, write_atomic};
 use crate::{Error, Result};
 
-/// Largest latent file that is read; N = 4096 vectors take about 200 kB.
-pub const MAX_LATENT_BYTES: u64 = 16 << 20;
+pub use crate::limits::MAX_LATENT_BYTES;
 
 const FORMAT: u32 = 1;
 
@@ -87,14 +86,7 @@ impl Latent {
     /// [`MAX_LATENT_BYTES`].
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
-        let mut bytes = Vec::new();
-        file.take(MAX_LATENT_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
-        if bytes.len() as u64 > MAX_LATENT_BYTES {
-            return Err(Error::too_large("not a latent (too large)").in_file(path));
-        }
-        let text =
-            String::from_utf8(bytes).map_err(|_| Error::invalid("not a latent (no text)").in_file(path))?;
+        let text = read_text(path, "a latent", MAX_LATENT_BYTES)?;
         Self::from_json(&text).map_err(|e| e.in_file(path))
     }
 
@@ -171,7 +163,7 @@ mod tests {
         std::fs::write(&path, [0xff, 0xfe, 0, 1]).unwrap();
         assert!(Latent::load(&path).unwrap_err().to_string().contains("noise.json"));
         std::fs::write(&path, vec![b' '; MAX_LATENT_BYTES as usize + 1]).unwrap();
-        assert!(Latent::load(&path).unwrap_err().to_string().contains("too large"));
+        assert!(Latent::load(&path).unwrap_err().to_string().contains("larger than 16 MiB"));
         let nan = Latent::new(vec![[f32::NAN, 0.0, 0.0]]);
         assert!(nan.save(&path, Overwrite::Replace).is_err());
     }

@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::DecoderConfig;
+use super::{Conditioning, DecoderConfig};
+use crate::limits::{
+    MAX_CONDITION_FEATURES, MAX_ENCODER_NUMBERS, MAX_ENCODER_SAMPLES, MAX_TOKEN_NUMBERS, at_most,
+};
 use crate::sphere::StripeSampling;
 use crate::{Error, Result};
 
@@ -28,13 +31,21 @@ impl ModelConfig {
         Self { kind: ModelKind::Veni, latent_vectors, decoder: DecoderConfig::default(), encoder: None }
     }
 
-    /// Checks every size: positive, and small enough that products of sizes stay far from overflow.
+    /// Checks every size: positive, and small enough that products of sizes stay far from overflow and what is computed
+    /// with fits into memory.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the field, its value and what is allowed.
+    /// [`Error::Invalid`] naming the field, its value and what is allowed; [`Error::TooLarge`] for an encoder beyond the
+    /// [limits](crate::limits).
     pub fn validate(&self) -> Result<()> {
         within("latent_vectors", self.latent_vectors, 4096)?;
         self.decoder.validate()?;
+        let features = self.decoder.condition_inputs(self.latent_vectors) as u64;
+        at_most("condition features", features, MAX_CONDITION_FEATURES)?;
+        if self.decoder.conditioning == Conditioning::Tokens {
+            let numbers = self.latent_vectors as u64 * self.decoder.hidden as u64;
+            at_most("numbers of a ray's tokens", numbers, MAX_TOKEN_NUMBERS)?;
+        }
         let Some(encoder) = &self.encoder else { return Ok(()) };
         within("encoder.stripes", encoder.stripes, 1 << 16)?;
         within("encoder.samples", encoder.samples.unwrap_or(1), 1 << 20)?;
@@ -42,7 +53,8 @@ impl ModelConfig {
         within("encoder.depth", encoder.depth, 256)?;
         within("encoder.heads", encoder.heads, 1024)?;
         within("encoder.head_channels", encoder.head_channels, 1024)?;
-        within("encoder.feedforward", encoder.feedforward, 64)
+        within("encoder.feedforward", encoder.feedforward, 64)?;
+        encoder.check_memory()
     }
 }
 
@@ -146,6 +158,23 @@ pub struct EncoderConfig {
     pub sampling: StripeSampling,
 }
 
+impl EncoderConfig {
+    /// What encoding one image holds, which no tensor of the file bounds.
+    fn check_memory(&self) -> Result<()> {
+        let [stripes, channels, heads] = [self.stripes, self.channels, self.heads].map(|n| n as u64);
+        let each = self.samples.map_or(stripes / 2, |n| n as u64);
+        let samples = stripes * each;
+        at_most("samples (encoder.stripes × encoder.samples)", samples, MAX_ENCODER_SAMPLES)?;
+        let tokens = 1 + if self.samples.is_some() { stripes } else { samples };
+        // rows are padded to whole vectors, those of heads each
+        let row = |n: u64| n.next_multiple_of(16);
+        let inner = row(heads * self.head_channels as u64) + 16 * heads;
+        let widest = 2 * row(channels) + 6 * inner + row(channels * self.feedforward as u64);
+        // six coordinates
+        at_most("numbers of an encoder's buffers", 6 * tokens * widest, MAX_ENCODER_NUMBERS)
+    }
+}
+
 impl Default for EncoderConfig {
     /// The paper's size.
     fn default() -> Self {
@@ -166,6 +195,56 @@ impl Default for EncoderConfig {
             variational: true,
             vn_relu: VnReluForm::Projection,
             sampling: StripeSampling::Exact,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn encoders_that_would_fill_the_memory_are_refused_by_their_configuration() {
+        let with = |change: fn(&mut EncoderConfig)| {
+            let mut encoder = EncoderConfig::default();
+            change(&mut encoder);
+            let config = ModelConfig { encoder: Some(encoder), ..ModelConfig::decode_only(9) };
+            config.validate()
+        };
+        with(|_| {}).unwrap();
+        // every sample a token, as in the paper's comparison
+        with(|e| (e.stripes, e.samples, e.channels) = (128, None, 64)).unwrap();
+        for (change, what) in [
+            ((|e| (e.stripes, e.samples) = (1 << 16, Some(1 << 15))) as fn(&mut EncoderConfig), "samples"),
+            (|e| (e.stripes, e.samples, e.channels) = (1 << 16, Some(8), 8192), "buffers"),
+            (|e| (e.stripes, e.samples, e.heads) = (1 << 14, Some(32), 1024), "buffers"),
+            (|e| (e.stripes, e.samples) = (1 << 16, None), "samples"),
+        ] {
+            let error = with(change).unwrap_err();
+            assert!(matches!(&error, Error::TooLarge(m) if m.contains(what)), "{error}");
+        }
+    }
+
+    #[test]
+    fn decoders_that_would_fill_the_memory_are_refused_by_their_configuration() {
+        use crate::model::Invariance;
+        let with = |vectors, change: fn(&mut DecoderConfig)| {
+            let mut config = ModelConfig::decode_only(vectors);
+            change(&mut config.decoder);
+            config.validate()
+        };
+        with(300, |d| (d.conditioning, d.invariance) = (Conditioning::Tokens, Invariance::GramMatrix))
+            .unwrap();
+        for (vectors, change, what) in [
+            (
+                4096,
+                (|d| d.invariance = Invariance::GramMatrix) as fn(&mut DecoderConfig),
+                "condition features",
+            ),
+            (4096, |d| (d.conditioning, d.hidden) = (Conditioning::Tokens, 512), "tokens"),
+        ] {
+            let error = with(vectors, change).unwrap_err();
+            assert!(matches!(&error, Error::TooLarge(m) if m.contains(what)), "{error}");
         }
     }
 }

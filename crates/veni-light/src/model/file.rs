@@ -2,19 +2,17 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::Path;
 
 use safetensors::tensor::{Dtype, SafeTensors, View};
 
 use super::{Array, Model, half, header};
+use crate::limits::{MAX_MODEL_HEADER_BYTES, at_most, read_file};
 use crate::output::{Overwrite, write_atomic};
 use crate::{Error, Result};
 
-/// Largest file that is read. The paper's largest model is 88 MB; nothing bigger than this is one of ours,
-/// and a wrong path cannot fill the memory.
-pub const MAX_FILE_BYTES: u64 = 1 << 30;
+pub use crate::limits::MAX_MODEL_BYTES as MAX_FILE_BYTES;
 
 /// How weights are stored. In memory they are always f32.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,21 +27,12 @@ impl Model {
     /// Reads a model file.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be read; [`Error::Invalid`] if it is larger than [`MAX_FILE_BYTES`], no
-    /// safetensors, has no `veni` header, or fails a check of [`Model::new`]; [`Error::Unsupported`] for
+    /// [`Error::Io`] if it cannot be read; [`Error::TooLarge`] beyond a limit of [`crate::limits`];
+    /// [`Error::Invalid`] if it is no safetensors, has no `veni` header, or fails a check of [`Model::new`]; [`Error::Unsupported`] for
     /// an unknown format, frame or stored type.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
-        let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
-        let limit = || too_large().in_file(path);
-        if size > MAX_FILE_BYTES {
-            return Err(limit());
-        }
-        let mut bytes = Vec::with_capacity(usize::try_from(size).map_err(|_| limit())?);
-        // `take`: the size above means nothing for a pipe or a growing file
-        let read = file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes);
-        read.map_err(|e| Error::io(path, "read", e))?;
+        let bytes = read_file(path, "a veni model", MAX_FILE_BYTES)?;
         Self::from_bytes(&bytes).map_err(|e| e.in_file(path))
     }
 
@@ -54,6 +43,10 @@ impl Model {
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         if bytes.len() as u64 > MAX_FILE_BYTES {
             return Err(too_large());
+        }
+        let header = bytes.first_chunk().map_or(0, |length| u64::from_le_bytes(*length));
+        if header <= bytes.len() as u64 {
+            at_most("bytes of header", header, MAX_MODEL_HEADER_BYTES)?;
         }
         let broken = |e| Error::invalid(format!("not a complete safetensors file ({e})"));
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(broken)?;

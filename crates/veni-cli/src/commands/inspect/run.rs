@@ -1,12 +1,13 @@
 //! A training run's folder.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use anyhow::{Result, bail};
 use serde_json::Value;
 use veni_light::Error;
+use veni_light::limits::{MAX_SETTINGS_BYTES, read_text};
 
 use super::facts::Facts;
 
@@ -22,7 +23,7 @@ pub(super) fn describe(folder: &Path) -> Result<Facts> {
             folder.display()
         );
     }
-    let config_text = fs::read_to_string(&config).map_err(|e| Error::io(&config, "read", e))?;
+    let config_text = read_text(&config, "a configuration", MAX_SETTINGS_BYTES)?;
     let mut facts = Facts::new("training run");
     let lines = if metrics.is_file() { read_lines(&metrics)? } else { Vec::new() };
     let steps = steps_of(&config_text);

@@ -3,9 +3,9 @@
 use std::sync::Mutex;
 
 use anyhow::Result;
-use rayon::prelude::*;
+use veni_data::parallel::parallel;
 use veni_data::prepare::{PrepareConfig, content_hash, examine};
-use veni_image::{HALF_ERROR, HalfRange, Panorama, Precision, WriteFormat, WriteOptions, half_error};
+use veni_image::{Budget, HALF_ERROR, HalfRange, Panorama, Precision, WriteFormat, WriteOptions, half_error};
 use veni_light::output::Overwrite;
 
 use super::network::NetworkSettings;
@@ -17,8 +17,6 @@ use crate::progress::Bars;
 use crate::report::{Report, to_stderr};
 use crate::source::stale_scale;
 
-/// Files of more bytes than this are examined one at a time: their pixels fill the memory.
-const LARGE: u64 = 1 << 25;
 /// The brightest value that is written without a factor, with room for rounding.
 const BRIGHTEST: f32 = 60_000.0;
 /// A mean luminance below this loses digits in half precision: 2⁻⁸.
@@ -40,7 +38,10 @@ pub(super) fn examine_all(
     let bars = Bars::new(report);
     bars.begin_after(skipped as u64, "", "file", Some(sources.len() as u64));
     let store = Mutex::new(store);
-    let one = |source: &&Source| -> Result<()> {
+    // as many at a time as there is memory for the pixels that their headers declare
+    parallel(todo.len(), |at| -> Result<()> {
+        let source = todo[at];
+        let _claim = Budget::shared().claim_file(&source.path, &config.read);
         let fate = fate(&store, source, config, network)?;
         if let Fate::Refused(reason) = &fate {
             to_stderr(&format!("{}: {reason}\n", source.path.display()));
@@ -48,10 +49,7 @@ pub(super) fn examine_all(
         lock(&store).add(Record::new(source, fate))?;
         bars.add(1);
         Ok(())
-    };
-    let (large, small): (Vec<_>, Vec<_>) = todo.into_iter().partition(|s| s.bytes > LARGE);
-    small.par_iter().try_for_each(one)?;
-    large.iter().try_for_each(one)?;
+    })?;
     bars.end();
     Ok(())
 }

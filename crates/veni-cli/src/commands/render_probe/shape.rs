@@ -6,12 +6,18 @@ use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use veni_fit::shade::{Camera, Mesh, REFERENCE_FIELD_OF_VIEW, Surface};
 use veni_light::Error;
+use veni_light::limits::{at_most, read_file};
 use veni_light::sphere::Frame;
 
 use crate::report::Report;
 
 /// Free space around the shape, as a fraction of the image's smaller side.
 const MARGIN: f64 = 0.04;
+
+/// Bytes of an OBJ file: the largest scans have a few hundred MB.
+const MAX_OBJ_BYTES: u64 = 1 << 30;
+/// Corners of its faces, each of which takes some 100 bytes in memory and two in the file: a scan of 11 million triangles.
+const MAX_OBJ_CORNERS: u64 = 1 << 25;
 
 /// Which axis of a mesh points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -53,10 +59,11 @@ pub(super) fn mesh(
 
 /// All objects of an OBJ file as one mesh in the native frame, three vertices of its own to each triangle.
 fn read(path: &Path, up: Up) -> Result<Mesh> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let bytes = read_file(path, "a Wavefront OBJ file that is read", MAX_OBJ_BYTES)?;
     let text = String::from_utf8(bytes)
         .map_err(|_| anyhow!("{}: is not text: a Wavefront OBJ file is", path.display()))?;
     let [with, without] = corners(&text);
+    at_most("corners of faces", (with + without) as u64, MAX_OBJ_CORNERS).map_err(|e| e.in_file(path))?;
     if with > 0 && without > 0 {
         bail!(
             "{}: {without} of {} corners of faces lack normals: give all of them one, or none",

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use veni_core::train::config::{DecoderBackend, TrainConfig};
 use veni_core::train::init::InitConfig;
 use veni_core::train::presets::Preset;
-use veni_light::Error;
+use veni_light::limits::{MAX_SETTINGS_BYTES, read_text};
 use veni_light::model::ModelKind;
 
 use super::args::{PresetName, SystemName, Train};
@@ -94,6 +94,6 @@ impl Train {
 }
 
 pub(super) fn read(path: &Path) -> Result<TrainConfig> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+    let text = read_text(path, "a configuration", MAX_SETTINGS_BYTES)?;
     Ok(TrainConfig::from_toml(&text).map_err(|e| e.in_file(path))?)
 }

@@ -13,19 +13,16 @@ mod torch;
 mod zip;
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
 use half::{bf16, f16};
 use safetensors::tensor::{Dtype, SafeTensors};
 
+use crate::limits::MAX_WEIGHTS_BYTES;
 use crate::{Error, Result};
+use veni_light::limits::read_file;
 use veni_light::model::Array;
-
-/// Largest file that is read: checkpoints with optimiser states are large, a wrong path must not fill the memory.
-const MAX_FILE_BYTES: u64 = 2 << 30;
 
 /// A tensor as a view of its file.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,12 +72,7 @@ impl Checkpoint {
     /// [`Error::Io`] if it cannot be read; [`Error::Invalid`] and [`Error::Unsupported`] by name if it is none of the
     /// formats, or damaged.
     pub fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
-        let mut bytes = Vec::new();
-        file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
-        if bytes.len() as u64 > MAX_FILE_BYTES {
-            return Err(Error::too_large("larger than 2 GiB: no file of LPIPS weights is").in_file(path));
-        }
+        let bytes = read_file(path, "a file of LPIPS weights", MAX_WEIGHTS_BYTES)?;
         Self::from_bytes(bytes).map_err(|e| e.in_file(path))
     }
 

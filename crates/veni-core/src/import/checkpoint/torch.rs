@@ -6,12 +6,8 @@ use std::ops::Range;
 use super::arena::{Arena, Id, Value};
 use super::pickle;
 use super::{Element, View, zip};
+use crate::limits::{MAX_WEIGHTS_ENTRIES, MAX_WEIGHTS_NESTING};
 use crate::{Error, Result};
-
-/// Dictionaries inside of dictionaries that are followed.
-const MAX_DEPTH: usize = 8;
-/// Entries that are looked at: dictionaries that share each other must not multiply without end.
-const MAX_ENTRIES: usize = 1 << 20;
 
 /// The tensors of a file in the zip format.
 pub(super) fn views_of_archive(file: &[u8]) -> Result<BTreeMap<String, View>> {
@@ -41,7 +37,7 @@ pub(super) fn views(
     root: Id,
     locate: &dyn Fn(&str) -> Option<Range<usize>>,
 ) -> Result<BTreeMap<String, View>> {
-    let (mut found, mut left) = (BTreeMap::new(), MAX_ENTRIES);
+    let (mut found, mut left) = (BTreeMap::new(), MAX_WEIGHTS_ENTRIES);
     walk(arena, root, String::new(), 0, &mut |name, id| {
         left = left.checked_sub(1).ok_or_else(|| Error::invalid("more than a million entries"))?;
         if let Some(view) =
@@ -66,7 +62,7 @@ fn walk(
         // optimiser states are keyed by numbers
         let Value::Text(key) = arena.get(*key) else { continue };
         let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-        if depth < MAX_DEPTH {
+        if depth < MAX_WEIGHTS_NESTING {
             walk(arena, *value, path, depth + 1, leaf)?;
         }
     }

@@ -7,6 +7,7 @@ use std::io::Write;
 use super::*;
 use crate::train::init::{self, InitConfig};
 use veni_data::PixelStorage;
+use veni_light::limits::{MAX_SETTINGS_BYTES, read_text};
 use veni_light::model::Model;
 use veni_light::output::{Overwrite, existing_above, write_atomic};
 use veni_light::progress::{Observer, Silent};
@@ -84,7 +85,7 @@ impl Trainer {
         observer: &dyn Observer,
     ) -> Result<Self> {
         let path = folder.join("config.toml");
-        let text = fs::read_to_string(&path).map_err(|e| Error::io(&path, "read", e))?;
+        let text = read_text(&path, "a configuration", MAX_SETTINGS_BYTES)?;
         let config = TrainConfig::from_toml(&text).map_err(|e| e.in_file(&path))?.with_pixel_storage(storage);
         for left in leftovers(folder)? {
             fs::remove_file(&left).map_err(|e| Error::io(&left, "remove", e))?;

@@ -21,6 +21,8 @@
 
 mod blend;
 #[cfg(feature = "onnx")]
+mod graph_check;
+#[cfg(feature = "onnx")]
 mod onnx;
 #[cfg(all(test, feature = "onnx"))]
 mod onnx_file;
@@ -29,6 +31,8 @@ mod onnx_tests;
 mod surround;
 #[cfg(test)]
 mod tests;
+#[cfg(feature = "onnx")]
+mod wire;
 
 use std::fmt::Debug;
 

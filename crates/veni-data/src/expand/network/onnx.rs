@@ -1,16 +1,18 @@
 //! Networks in ONNX files, run by the `rten` crate.
 
 use std::path::Path;
+use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use rten::{DataType, Dimension, LoadError, LoadErrorKind, Model, NodeId, Value, ValueType};
 use veni_light::digest::Digest;
 
-use super::Network;
+use super::wire::Fields;
+use super::{Network, graph_check};
+use crate::limits::{MAX_ONNX_BYTES, MAX_ONNX_PIXELS, MAX_ONNX_SECONDS, at_most};
 use crate::{Error, Result};
 
-/// Protocol buffers, and so ONNX files, are no larger.
-const MAX_BYTES: u64 = 1 << 31;
 /// The size at which a network that takes any is tried when it is loaded, \[height, width\].
 const TRIAL: [usize; 2] = [64, 128];
 
@@ -41,7 +43,7 @@ impl OnnxNetwork {
         if meta.is_dir() {
             return Err(Error::invalid("is a folder, not an ONNX file").in_file(path));
         }
-        if meta.len() > MAX_BYTES {
+        if meta.len() > MAX_ONNX_BYTES {
             return Err(Error::too_large("is larger than 2 GiB, which no ONNX file is").in_file(path));
         }
         let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
@@ -59,13 +61,15 @@ impl OnnxNetwork {
         if !is_whole(&bytes) {
             return Err(Error::invalid("is not an ONNX model, or truncated"));
         }
-        let model = Model::load(bytes).map_err(|e| refusal(&e))?;
+        graph_check::check(&bytes)?;
+        let model = load_in_time(bytes)?;
         let input = only(&model, model.input_ids(), "input")?;
         let output = only(&model, model.output_ids(), "output")?;
         let [height, width] = declared(&model, input)?;
         let network =
             Self { name, digest, model, input, output, size: [height, width], turn: Mutex::new(()) };
         let size = [height.unwrap_or(TRIAL[0]), width.unwrap_or(TRIAL[1])];
+        at_most("pixels of input", (size[0] as u64).saturating_mul(size[1] as u64), MAX_ONNX_PIXELS)?;
         let pixels = size[0] * size[1];
         // a ramp: some networks divide by the contrast of what they see
         let ramp = (0..3 * pixels).map(|k| (k % pixels) as f32 / pixels as f32).collect();
@@ -124,37 +128,27 @@ impl Network for OnnxNetwork {
 /// Whether the fields of the outermost message (Protocol Buffers) fill the file: the runtime takes what is left of a
 /// truncated graph for a smaller one.
 fn is_whole(bytes: &[u8]) -> bool {
-    fn varint(rest: &mut &[u8]) -> Option<u64> {
-        let mut value = 0;
-        for shift in (0..64).step_by(7) {
-            let (first, tail) = rest.split_first()?;
-            *rest = tail;
-            value |= u64::from(first & 0x7F) << shift;
-            if first & 0x80 == 0 {
-                return Some(value);
-            }
-        }
-        None
-    }
-    fn field(rest: &mut &[u8]) -> Option<()> {
-        // the wire type is in the lowest bits of the tag
-        let length = match varint(rest)? & 7 {
-            0 => varint(rest).map(|_| 0)?,
-            1 => 8,
-            2 => usize::try_from(varint(rest)?).ok()?,
-            5 => 4,
-            _ => return None,
-        };
-        *rest = rest.get(length..)?;
-        Some(())
-    }
-    let mut rest = bytes;
-    while !rest.is_empty() {
-        if field(&mut rest).is_none() {
-            return false;
+    !bytes.is_empty() && Fields::of(bytes).all(|field| field.is_some())
+}
+
+/// Loads a checked network on a thread of its own, whose time is limited: what loading does depends on the network, and no
+/// check of ours foresees all of it. A thread that is not done goes on until the program ends.
+fn load_in_time(bytes: Vec<u8>) -> Result<Model> {
+    let (done, wait) = std::sync::mpsc::channel();
+    let work = move || drop(done.send(Model::load(bytes)));
+    std::thread::Builder::new()
+        .name("onnx".into())
+        .spawn(work)
+        .map_err(|e| Error::invalid(format!("no thread to load it on: {e}")))?;
+    match wait.recv_timeout(Duration::from_secs(MAX_ONNX_SECONDS)) {
+        Ok(model) => model.map_err(|e| refusal(&e)),
+        Err(RecvTimeoutError::Timeout) => Err(Error::too_large(format!(
+            "took the ONNX runtime more than {MAX_ONNX_SECONDS} seconds to load, the limit"
+        ))),
+        Err(RecvTimeoutError::Disconnected) => {
+            Err(Error::invalid("the ONNX runtime gave up on it; the reason stands above"))
         }
     }
-    !bytes.is_empty()
 }
 
 /// The one input or output that there is to be.

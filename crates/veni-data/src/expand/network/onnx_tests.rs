@@ -156,13 +156,65 @@ fn files_that_do_not_fit_are_refused() {
         folder.refused("split.onnx", &split.bytes(), &["other files", "external_data=False"]);
     }
     let missing = OnnxFile::image([0, 0]).node("Mul", &["x", "nowhere"], "y", &[]).bytes();
-    folder.refused("missing.onnx", &missing, &["nowhere"]);
+    folder.refused("missing.onnx", &missing, &["nowhere", "not made before"]);
     let small = OnnxFile::image([0, 0]).constant("three", &[1, 3, 5, 5], &[1.0; 75]);
     folder.refused(
         "small.onnx",
         &small.node("Mul", &["x", "three"], "y", &[]).bytes(),
         &["cannot be run", "Mul"],
     );
+}
+
+#[test]
+fn graphs_that_the_runtime_would_not_survive_are_refused_before() {
+    let folder = Folder::new();
+    let whole = OnnxFile::times(4.0, [0, 0]).bytes();
+    // lengths beyond the message that holds them, the largest of which seeks backwards
+    for length in [&[0x7F][..], &[0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x08], &[0xFF; 9]] {
+        let text = [&[0x12], length, &[1][..usize::from(length.len() == 9)], b"x"].concat();
+        let graph = [&[0x3A, text.len() as u8][..], &text].concat();
+        folder.refused("length.onnx", &[&[8, 8][..], &graph].concat(), &["damaged", "beyond its whole"]);
+    }
+    // a cycle, and a value that is made twice
+    let cycle = OnnxFile::image([0, 0]).node("Add", &["x", "b"], "a", &[]).node("Relu", &["a"], "b", &[]);
+    let cycle = cycle.node("Relu", &["b"], "y", &[]).bytes();
+    folder.refused("cycle.onnx", &cycle, &["Add takes 'b'", "not made before"]);
+    let twice = OnnxFile::image([0, 0]).node("Relu", &["x"], "y", &[]).node("Relu", &["x"], "y", &[]);
+    folder.refused("twice.onnx", &twice.bytes(), &["makes 'y' twice"]);
+    let loops = OnnxFile::image([0, 0]).node("Loop", &["x"], "y", &[]).bytes();
+    folder.refused("loop.onnx", &loops, &["Loop", "cannot be told"]);
+    // numbers that would be allocated
+    let conv = |name: &'static str, value: u64| {
+        let file = OnnxFile::image([0, 0]).constant("kernel", &[3, 3, 1, 1], &[1.0; 9]);
+        file.node("Conv", &["x", "kernel"], "y", &[(name, &[value, value])]).bytes()
+    };
+    folder.refused("pads.onnx", &conv("pads", 1 << 40), &["pads", "limit of 1024"]);
+    folder.refused("negative.onnx", &conv("pads", u64::MAX), &["pads", "limit of 1024"]);
+    folder.refused("strides.onnx", &conv("strides", 65), &["strides", "limit of 64"]);
+    folder.refused(
+        "input.onnx",
+        &OnnxFile::times(1.0, [1 << 20, 1 << 21]).bytes(),
+        &["pixels of input", "limit"],
+    );
+    let short = OnnxFile::image([0, 0]).constant("c", &[2], &[1.0]);
+    folder.refused("short.onnx", &short.bytes(), &["constant 'c' has 1 values", "say 2"]);
+    let huge = OnnxFile::image([0, 0]).constant("c", &[1 << 40, 1 << 40], &[1.0]);
+    folder.refused("huge.onnx", &huge.bytes(), &["constant 'c'", "limit"]);
+    // what is refused is not what every network has
+    assert!(OnnxNetwork::load(folder.write("whole.onnx", &whole)).is_ok());
+}
+
+/// The cases that were found by fuzzing: an allocation of an unchecked length, a loop without an end, a name of 2⁵⁶ bytes.
+#[test]
+fn found_files_are_refused() {
+    let folder = Folder::new();
+    for (name, bytes) in [
+        ("alloc.onnx", &include_bytes!("files/alloc.onnx")[..]),
+        ("hang.onnx", include_bytes!("files/hang.onnx")),
+        ("name.onnx", include_bytes!("files/name.onnx")),
+    ] {
+        folder.refused(name, bytes, &["not an ONNX model"]);
+    }
 }
 
 #[test]

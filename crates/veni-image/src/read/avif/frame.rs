@@ -1,7 +1,6 @@
 //! One AV1 frame, and its colours.
 
 use rayon::prelude::*;
-use re_rav1d::dav1d::pixel::YUVRange;
 use re_rav1d::dav1d::{Decoder, Picture, PixelLayout, PlanarImageComponent, Settings};
 
 use super::Coding;
@@ -46,20 +45,11 @@ impl Frame {
         [self.picture.width() as usize, self.picture.height() as usize]
     }
 
-    /// As the stream itself says.
-    pub(super) fn coding(&self) -> Coding {
-        Coding {
-            transfer: self.picture.transfer_characteristic() as u8,
-            matrix: self.picture.matrix_coefficients() as u8,
-            full_range: matches!(self.picture.color_range(), YUVRange::Full),
-        }
-    }
-
     /// Samples from 0 to 1, row-major: those of an alpha channel.
-    pub(super) fn opacity(&self) -> Vec<f32> {
+    pub(super) fn opacity(&self, full_range: bool) -> Vec<f32> {
         let plane = self.picture.plane(PlanarImageComponent::Y);
         let luma = self.samples(&plane, [1, 1]);
-        let scale = Scale::new(self.bits, self.coding().full_range);
+        let scale = Scale::new(self.bits, full_range);
         let [width, height] = self.size();
         let row = |y: usize| (0..width).map(move |x| (x, y));
         (0..height).flat_map(row).map(|(x, y)| scale.luma(luma.at(x, y)).clamp(0.0, 1.0)).collect()

@@ -4,6 +4,7 @@
 //! the AV1 stream says, and an unspecified matrix is that of BT.601.
 
 mod frame;
+mod sequence;
 #[cfg(test)]
 mod tests;
 
@@ -12,9 +13,11 @@ use std::path::Path;
 
 use avif_parse::AvifData;
 
-use super::{LdrPanorama, ReadOptions};
+use super::{LdrPanorama, ReadOptions, precheck};
+use crate::limits::{MAX_FILE_BYTES, at_most};
 use crate::{Error, Result};
 use frame::Frame;
+use sequence::Sequence;
 
 /// Code points of H.273 for what display values mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,30 +27,49 @@ struct Coding {
     full_range: bool,
 }
 
-pub(super) fn read(mut file: impl Read, path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
+/// All bytes of the file, within the limit.
+fn content(file: impl Read, path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
+    at_most("bytes of file", bytes.len() as u64, MAX_FILE_BYTES)?;
+    Ok(bytes)
+}
+
+/// The size that the picture's stream declares.
+pub(super) fn declared(file: impl Read, path: &Path) -> Result<[u64; 2]> {
+    let data = AvifData::from_reader(&mut content(file, path)?.as_slice()).map_err(wrap)?;
+    Ok(Sequence::of(&data.primary_item)?.size)
+}
+
+pub(super) fn read(file: impl Read, path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
+    let bytes = content(file, path)?;
     let data = AvifData::from_reader(&mut bytes.as_slice()).map_err(wrap)?;
-    let header = data.primary_item_metadata().map_err(wrap)?;
-    let size = [header.max_frame_width, header.max_frame_height].map(|n| n.get() as usize);
+    let sequence = Sequence::of(&data.primary_item)?;
+    let size = sequence.size.map(|n| n as usize);
     let grid = options.check(size[0], size[1])?;
+    precheck::room(Some(sequence.size), options)?;
     let properties = properties(&bytes);
     refuse_transformed(properties)?;
 
     let limit = u32::try_from(options.max_pixels).unwrap_or(u32::MAX);
-    let colour = Frame::decode(&data.primary_item, limit)?;
-    let coding = nclx(properties).unwrap_or_else(|| colour.coding());
+    let coding = nclx(properties).unwrap_or(sequence.coding);
     refuse_other_curves(coding.transfer)?;
+    let colour = Frame::decode(&data.primary_item, limit)?;
     if colour.size() != size {
         return Err(Error::invalid("damaged AVIF file: the picture is not as large as its header says"));
     }
     let mut panorama = LdrPanorama::new(grid, colour.rgb(coding)?);
     if let Some(alpha) = &data.alpha_item {
+        let Sequence { size: claimed, coding } = Sequence::of(alpha)?;
+        if claimed != sequence.size {
+            return Err(Error::invalid("damaged AVIF file: its alpha is not as large as the picture"));
+        }
         let alpha = Frame::decode(alpha, limit)?;
         if alpha.size() != size {
             return Err(Error::invalid("damaged AVIF file: its alpha is not as large as the picture"));
         }
-        panorama.alpha = Some(alpha.opacity()).filter(|alpha| alpha.iter().any(|a| *a < 1.0));
+        panorama.alpha =
+            Some(alpha.opacity(coding.full_range)).filter(|alpha| alpha.iter().any(|a| *a < 1.0));
     }
     Ok(panorama)
 }

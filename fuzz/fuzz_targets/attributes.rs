@@ -1,0 +1,4 @@
+//! `cargo fuzz run attributes`: see fuzz/targets.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| veni_fuzz_targets::run("attributes", data));
