@@ -24,7 +24,7 @@ pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer)
     folder.add_exr("diffuse.exr", &stacked(&sky.prefilter.diffuse(DIFFUSE.min(sky.size), CubeAxes::GLTF)))?;
     observer.advance(1);
     let dfg = Dfg::new(DFG).values().iter().map(|[x, y]| [*x, *y, 0.0]).collect();
-    folder.add_exr("dfg.exr", &Panorama::new(Equirect::new(DFG, DFG), dfg))?;
+    folder.add_numbers("dfg.exr", &Panorama::new(Equirect::new(DFG, DFG), dfg))?;
     folder.add_exr("sky.exr", sky.panorama)?;
     observer.advance(1);
     let sun = sky.sun.map_or("null".to_owned(), |sun| {

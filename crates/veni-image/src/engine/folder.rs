@@ -57,11 +57,20 @@ impl Folder {
 
     /// An image as EXR: in half precision where that keeps its values.
     pub(super) fn add_exr(&mut self, name: &str, image: &Panorama) -> Result<()> {
+        self.add_values(name, image, true)
+    }
+
+    /// The same of values that are no colours.
+    pub(super) fn add_numbers(&mut self, name: &str, image: &Panorama) -> Result<()> {
+        self.add_values(name, image, false)
+    }
+
+    fn add_values(&mut self, name: &str, image: &Panorama, colour: bool) -> Result<()> {
         let keeps = half_error(image.pixels(), 1.0) <= HALF_ERROR;
         let precision = if keeps { Precision::Half } else { Precision::Float };
         // what little it loses at the dark end is no reason to refuse
         let half_range = HalfRange::Factor(1.0);
-        let options = WriteOptions { half_range, ..WriteOptions::new(WriteFormat::Exr(precision)) };
+        let options = WriteOptions { half_range, colour, ..WriteOptions::new(WriteFormat::Exr(precision)) };
         image.write(self.staged.join(name), &options)?;
         self.names.push(name.to_owned());
         Ok(())

@@ -104,17 +104,16 @@ fn band(
         let half = if m == 0 { 1.0 } else { 0.5 };
         let (s, c) = (PI * m as f64 / grid.width as f64).sin_cos();
         let (re, im) = (sign * half * c, sign * half * s);
-        for k in 0..LANES {
-            for side in 0..2 {
-                let value = |part: usize| {
-                    let [even, odd] = [sums[0][part][k], sums[1][part][k]];
-                    if side == 0 { even + odd } else { even - odd }
-                };
-                for channel in 0..3 {
-                    let (a, b) = (value(channel), value(channel + 3));
-                    let wave = Complex32::new((a * re - b * im) as f32, (a * im + b * re) as f32);
-                    work.waves[((2 * k + side) * 3 + channel) * bins + m] = wave;
-                }
+        for row in 0..2 * LANES {
+            let (lane, south) = (row / 2, row % 2 == 1);
+            let value = |part: usize| {
+                let [even, odd] = [sums[0][part][lane], sums[1][part][lane]];
+                if south { even - odd } else { even + odd }
+            };
+            for channel in 0..3 {
+                let (a, b) = (value(channel), value(channel + 3));
+                let wave = Complex32::new((a * re - b * im) as f32, (a * im + b * re) as f32);
+                work.waves[(row * 3 + channel) * bins + m] = wave;
             }
         }
     }
