@@ -61,6 +61,7 @@ fn completions_and_manual_pages_know_every_command() {
         "prepare",
         "render-probe",
         "light",
+        "ibl",
         "inspect",
         "bench",
         "train",

@@ -4,6 +4,7 @@ mod encoding;
 mod image;
 mod latent;
 mod model;
+mod radiance;
 mod remembered;
 
 pub(crate) use encoding::{Encoded, Encoding};
@@ -12,3 +13,4 @@ pub(crate) use latent::{from_file, is_latent, model_of, seeded};
 #[cfg(feature = "learn")]
 pub(crate) use model::model_file;
 pub(crate) use model::{Loaded, model};
+pub(crate) use radiance::{Named, Radiance, radiance};

@@ -55,11 +55,11 @@ pub const MAX_HDR_HEADER_LINES: usize = 1 << 14;
 
 /// Bytes that reading a file takes at its peak for each pixel that its header declares: the decoder's samples and
 /// coefficients, three floats of display values, three of radiance, alpha.
-pub const READ_BYTES_PER_PIXEL: u64 = 32;
+pub const READ_BYTES_PER_PIXEL: u64 = 40;
 
 /// The same for reading a panorama, examining it, and where its range is limited expanding it: masks, regions and distances
 /// of what is clipped. Measured on pictures that are clipped as a whole (tests/cli, `memory_follows_the_declared_pixels`).
-pub const EXAMINE_BYTES_PER_PIXEL: u64 = 80;
+pub const EXAMINE_BYTES_PER_PIXEL: u64 = 96;
 
 /// Bytes that reading any file may take besides its pixels: headers, metadata, buffers of decoders.
 pub const BYTES_PER_FILE: u64 = 32 << 20;

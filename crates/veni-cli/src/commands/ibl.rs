@@ -1,6 +1,5 @@
 //! `veni-cli ibl`: a sky as folders that engines load.
 
-mod input;
 mod unit;
 
 use std::path::PathBuf;
@@ -22,7 +21,11 @@ use crate::output::with_remedy;
 use crate::progress::Bars;
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
+use crate::source::{self, Named};
 use unit::Unit;
+
+/// Where a latent is decoded if nothing else is asked for: decoded skies hold nothing finer than some degrees.
+const DECODED: Equirect = Equirect { width: 2048, height: 1024 };
 
 /// Make a sky ready for an engine: maps, sun, and the lines that load them
 #[derive(Args, Debug)]
@@ -180,14 +183,9 @@ impl Ibl {
         let sky_grid =
             self.sky_size.map(|size| size.equirect().map(|(w, h)| Equirect::new(w, h))).transpose()?;
         let started = Instant::now();
-        let panorama = input::radiance(
-            self.input.as_deref(),
-            self.seed,
-            sky_grid.map(|grid| grid.width),
-            &self.decoding,
-            &self.layer,
-            report,
-        )?;
+        let named = Named::new(self.input.as_deref(), self.seed)?;
+        let grid = sky_grid.unwrap_or(DECODED);
+        let panorama = source::radiance(named, &self.layer, &self.decoding, grid, report)?.panorama;
         let mut split = self.split(panorama)?;
         let unit =
             Unit::of(split.whole.as_ref().unwrap_or(&split.map), &split.map, folders.iter().map(|f| f.0));

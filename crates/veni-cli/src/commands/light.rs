@@ -1,25 +1,31 @@
 //! `veni-cli light`: the sun and other lights of a panorama or a latent, harmonics, irradiance.
 
 mod choice;
-mod input;
+mod convention;
 mod print;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use clap::{ArgGroup, Args, ValueEnum};
+use clap::{ArgGroup, Args};
 use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
 use veni_light::Error;
 use veni_light::light::{EnvironmentMap, LightOptions};
 use veni_light::output::{self as files, Overwrite};
+use veni_light::sphere::Equirect;
 
-use crate::args::{Force, Layer, ModelArgs};
+use crate::args::{Decoding, Force, Layer};
 use crate::numbers::positive;
-use crate::output::{self, with_remedy};
+use crate::output::{self, SCENE, with_remedy};
+use crate::printable::printable;
 use crate::report::{Outcome, Report};
 use crate::size::Size;
+use crate::source::{self, Named, Radiance};
 use choice::Sun;
-use input::{Input, Named};
+use convention::Convention;
+
+/// Where a latent is decoded, unless another size is asked for.
+const DECODED: (usize, usize) = (512, 256);
 
 /// Find the sun and other lights of a panorama or a latent: direction, irradiance, harmonics
 #[derive(Args, Debug)]
@@ -94,27 +100,10 @@ pub(crate) struct Light {
     layer: Layer,
 
     #[command(flatten)]
-    model: ModelArgs,
+    decoding: Decoding,
 
     #[command(flatten)]
     force: Force,
-}
-
-/// How harmonics are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Convention {
-    /// Radiance, native frame
-    Native,
-    /// Filament's sh.txt: E/π as a polynomial, its frame
-    Filament,
-    /// three.js' SphericalHarmonics3: radiance, no sign, its frame
-    Three,
-    /// The polynomial of Babylon's .env files (x y z xx yy zz yz zx xy), its left-handed frame
-    Babylon,
-    /// glTF's `EXT_lights_image_based`: irradiance, its frame
-    Gltf,
-    /// Irradiance, native frame
-    Irradiance,
 }
 
 impl Light {
@@ -124,12 +113,16 @@ impl Light {
         output::check(&images, &["exr", "hdr"], overwrite)?;
         output::check(self.output.as_slice(), &["json"], overwrite)?;
         let size = self.size.map(Size::equirect).transpose()?;
-        let named = match (&self.input, self.seed) {
-            (Some(path), _) => Named::File(path),
-            (None, Some(seed)) => Named::Seed(seed),
-            (None, None) => bail!("name a panorama, a latent or a seed"),
-        };
-        let Input { name, panorama, unit } = input::read(named, &self.model, &self.layer, size, report)?;
+        let (width, height) = size.unwrap_or(DECODED);
+        let named = Named::new(self.input.as_deref(), self.seed)?;
+        let grid = Equirect::new(width, height);
+        let found = source::radiance(named, &self.layer, &self.decoding, grid, report)?;
+        let Radiance { name, panorama, decoded } = found;
+        if !decoded && size.is_some() {
+            bail!("{name}: a panorama is looked at as it is; --size is for what is decoded from a latent");
+        }
+        // generated scenes are in kcd/m²
+        let unit = if panorama.attributes().contains_key(SCENE) { 1000.0 } else { 1.0 };
         let options = LightOptions {
             sun: self.sun.0,
             sun_radius: self.sun_radius.map(|r| r.to_radians() as f32),
@@ -164,7 +157,7 @@ impl Light {
             files::write_atomic(path, overwrite, |file| write(file).map_err(|e| Error::io(path, "write", e)))
                 .map_err(with_remedy)?;
         }
-        report.result(print::text(&name, &light, self.sh, lux), &value)?;
+        report.table(&print::text(&printable(&name), &light, self.sh, lux), &value)?;
         Ok(Outcome::Fine)
     }
 }

@@ -38,27 +38,23 @@ pub(crate) fn seeded(model: &Model, seed: u64) -> Latent {
 pub(crate) fn from_file(path: &Path, layer: &Layer, loaded: &Loaded, report: Report) -> Result<Latent> {
     let model = &loaded.model;
     let mut latent = match stored(path)? {
-        Some(latent) => latent,
-        None => {
-            report.note(format_args!("{}: no latent inside; encoding the panorama", path.display()));
-            encode(path, layer, loaded, report)?
+        Some(latent) => {
+            check(&latent, loaded).with_context(|| path.display().to_string())?;
+            if is_latent(path)? || is_of_its_pixels(path, &latent, model)? {
+                latent
+            } else if is_cube_map(path)? {
+                bail!(
+                    "{}: a cube map whose pixels were changed after its latent was written, and cube maps cannot be \
+                     encoded; name the original, or an equirectangular panorama",
+                    path.display()
+                );
+            } else {
+                let why = "its pixels were changed after its latent was written";
+                encode(path, layer, loaded, why, report)?
+            }
         }
+        None => encode(path, layer, loaded, "no latent inside", report)?,
     };
-    check(&latent, loaded).with_context(|| path.display().to_string())?;
-    if !is_latent(path)? && !is_of_its_pixels(path, &latent, model)? {
-        if is_cube_map(path)? {
-            bail!(
-                "{}: a cube map whose pixels were changed after its latent was written, and cube maps cannot be encoded; \
-                 name the original, or an equirectangular panorama",
-                path.display()
-            );
-        }
-        report.note(format_args!(
-            "{}: its pixels were changed after its latent was written; encoding the panorama",
-            path.display()
-        ));
-        latent = encode(path, layer, loaded, report)?;
-    }
     if latent.model.is_none() {
         report.note(format_args!(
             "{}: does not say which model it belongs to; taken for this one",
@@ -124,8 +120,10 @@ fn is_cube_map(path: &Path) -> Result<bool> {
     Ok(veni_image::attributes(path).map_err(with_remedy)?.contains_key(CUBE_FACES))
 }
 
-fn encode(path: &Path, layer: &Layer, loaded: &Loaded, report: Report) -> Result<Latent> {
-    super::encoding::Encoding::new(loaded)?.encode_file(path, layer, report).map(|e| e.latent)
+fn encode(path: &Path, layer: &Layer, loaded: &Loaded, why: &str, report: Report) -> Result<Latent> {
+    let encoded = super::encoding::Encoding::new(loaded)?.encode_file(path, layer, report)?;
+    report.note(format_args!("{}: {why}; the panorama was encoded", path.display()));
+    Ok(encoded.latent)
 }
 
 /// Whether a file is a latent, and not an image: JSON is a latent; everything else is left to the image readers, which say what

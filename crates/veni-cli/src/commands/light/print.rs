@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
-use veni_light::light::{CompactLight, Light, Sh, luminance};
+use veni_light::light::{CompactLight, Light, luminance};
 
-use super::Convention;
+use super::convention::Convention;
 
 /// Ways that a surface may face.
 const WAYS: [(&str, [f32; 3]); 6] = [
@@ -16,31 +16,6 @@ const WAYS: [(&str, [f32; 3]); 6] = [
     ("back", [-1.0, 0.0, 0.0]),
     ("right", [0.0, -1.0, 0.0]),
 ];
-
-impl Convention {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Native => "native",
-            Self::Filament => "filament",
-            Self::Three => "three",
-            Self::Babylon => "babylon",
-            Self::Gltf => "gltf",
-            Self::Irradiance => "irradiance",
-        }
-    }
-
-    fn of(self, sh: &Sh<2>) -> [[f32; 3]; 9] {
-        let native = |sh: &Sh<2>| std::array::from_fn(|k| sh.coefficients()[k].map(|v| v as f32));
-        match self {
-            Self::Native => native(sh),
-            Self::Filament => sh.filament(),
-            Self::Three => sh.three(),
-            Self::Babylon => sh.babylon(),
-            Self::Gltf => sh.gltf(),
-            Self::Irradiance => native(&sh.irradiance()),
-        }
-    }
-}
 
 /// Everything, for one line.
 pub(super) fn json(light: &Light, convention: Option<Convention>, lux: Option<f64>) -> Value {
