@@ -27,6 +27,7 @@ mod sampler;
 pub mod sh;
 mod spectrum;
 mod turn;
+mod vector;
 
 pub use compact::{CompactLight, Kind, RadiusSource};
 pub use disc::Disc;

@@ -66,8 +66,8 @@ fn discs_are_found_at_any_size_elevation_and_resolution() {
                 let sun = light.sun().unwrap_or_else(|| panic!("{what}: no sun among {:?}", light.lights()));
                 let off = degrees(sun.direction, put.direction);
                 assert!(off <= 0.25 * pixel, "{what}: {off}° off, a pixel is {pixel}°");
-                for c in 0..3 {
-                    let ratio = sun.irradiance[c] / irradiance[c];
+                for (found, given) in sun.irradiance.iter().zip(irradiance) {
+                    let ratio = found / given;
                     assert!((ratio - 1.0).abs() < 0.01, "{what}: irradiance {:?}", sun.irradiance);
                 }
                 if radius > 1.5 * pixel {

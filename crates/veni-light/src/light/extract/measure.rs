@@ -1,8 +1,8 @@
 //! One candidate at one scale: what surrounds it, what exceeds that, and where the middle of the excess is.
 
 use super::level::{Cell, View};
-use super::vector::{angle, normalised};
 use crate::light::luminance::{LUMINANCE, luminance};
+use crate::light::vector::{angle, normalised};
 
 /// Excess below this part of the largest does not move the centre: what is around a light is lit by it, and not evenly.
 const CORE: f64 = 0.25;
@@ -127,9 +127,9 @@ pub(super) fn core_centre(view: View<'_>, measured: &Measured) -> Option<([f64; 
         view.cap(centre, radius + 2.0 * cell, |c| {
             let y = luminance(c.radiance);
             if angle(c.direction, centre) > radius {
-                ring.push((y, c.solid_angle))
+                ring.push((y, c.solid_angle));
             } else {
-                inside.push((c, y))
+                inside.push((c, y));
             }
         });
         let base = f64::from(quantile(ring, 0.5));

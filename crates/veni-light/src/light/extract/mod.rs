@@ -5,16 +5,15 @@ mod measure;
 mod search;
 mod shape;
 mod sun;
-mod vector;
 
 use super::compact::{CompactLight, Kind};
 use super::luminance::luminance;
+use crate::light::vector::{angle, dot, normalised};
 use crate::sphere::Equirect;
 use crate::tasks;
 pub(super) use level::Level;
 use level::View;
 use measure::{Measured, core_centre, luminance_of, measure};
-use vector::{angle, dot};
 
 /// Radii of the caps that a light is measured in, degrees.
 const SCALES: [f64; 6] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
@@ -102,11 +101,11 @@ impl Extraction {
     pub(super) fn run(mut self, criteria: Criteria, choice: SunChoice) -> Extracted {
         let mut found = Vec::new();
         let mut sun = None;
-        if let SunChoice::Towards(direction) = choice {
-            if let Some(measured) = self.near(direction) {
-                found.push(self.take(&measured));
-                sun = Some(0);
-            }
+        if let SunChoice::Towards(direction) = choice
+            && let Some(measured) = self.near(direction)
+        {
+            found.push(self.take(&measured));
+            sun = Some(0);
         }
         let most = if choice == SunChoice::Nothing { 0 } else { criteria.most };
         while found.len() < most {
@@ -137,7 +136,7 @@ impl Extraction {
 
     /// The light at the brightest pixel near a direction, however faint.
     fn near(&self, direction: [f32; 3]) -> Option<Measured> {
-        let direction = vector::normalised(direction.map(f64::from))?;
+        let direction = normalised(direction.map(f64::from))?;
         let radius = NEAR.to_radians().max(PIXELS * self.levels[0].cell_angle());
         let mut best: Option<(f32, [f64; 3])> = None;
         self.view(0).cap(direction, radius, |cell| {
@@ -226,7 +225,7 @@ impl Extraction {
         // the first moment of what is wide lights surfaces as it does
         let kind = Kind::of(radius as f32);
         let mut direction = core;
-        if let Some(middle) = vector::normalised(moment)
+        if let Some(middle) = normalised(moment)
             && kind != Kind::Disc
         {
             direction = middle;

@@ -28,7 +28,7 @@ pub(super) fn seeds(fine: View<'_>, coarse: View<'_>) -> Vec<[f64; 3]> {
 /// The cell of the greatest luminance.
 fn brightest(view: View<'_>) -> Option<[f64; 3]> {
     let rows = view.cells().chunks(view.level().width()).enumerate();
-    let of_row = |(), (row, cells): (usize, &[[f32; 3]])| {
+    let of_row = |(row, cells): (usize, &[[f32; 3]])| {
         let mut best = (0.0, 0);
         for (column, cell) in cells.iter().enumerate() {
             let y = luminance(*cell);
@@ -38,7 +38,7 @@ fn brightest(view: View<'_>) -> Option<[f64; 3]> {
         }
         best
     };
-    let best = tasks::map(rows, || (), |unit, row| of_row(*unit, row));
+    let best = tasks::map(rows, || (), |(), row| of_row(row));
     let best = best.into_iter().reduce(|a, b| if b.0 > a.0 { b } else { a })?;
     (best.0 > 0.0).then(|| view.cell(best.1).direction)
 }

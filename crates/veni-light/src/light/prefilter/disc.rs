@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::{CubeAxes, CubeMap};
 use crate::light::CompactLight;
+use crate::light::vector::across;
 use crate::sphere::CubeFace;
 
 /// Rings, and places on each, of a disc.
@@ -16,10 +17,7 @@ impl CubeMap {
     pub(super) fn add_disc(&mut self, light: &CompactLight, axes: CubeAxes) {
         let size = self.size();
         let n = light.direction.map(f64::from);
-        // any two axes across the direction
-        let helper = if n[2].abs() < 0.9 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
-        let u = unit(cross(helper, n));
-        let v = cross(n, u);
+        let [u, v] = across(n);
         let cap = 2.0 * (0.5 * f64::from(light.radius)).sin().powi(2);
         let share = 1.0 / (RINGS * AROUND) as f64;
         let mut shares: std::collections::BTreeMap<usize, f64> = std::collections::BTreeMap::new();
@@ -37,13 +35,4 @@ impl CubeMap {
             *texel = [0, 1, 2].map(|c| texel[c] + (f64::from(light.irradiance[c]) * share / area) as f32);
         }
     }
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn unit(v: [f64; 3]) -> [f64; 3] {
-    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-    v.map(|x| x / length)
 }

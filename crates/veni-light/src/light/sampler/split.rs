@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::alias::BELOW_ONE;
 use super::{Sample, Sampler};
+use crate::light::vector::across;
 use crate::light::{CompactLight, luminance};
 
 /// Draws the sun, as a disc, or the rest of the sky, by their power. Radiance and density are those of both together, so that a
@@ -31,12 +32,9 @@ impl<'a> SplitSampler<'a> {
         let power = |rgb: [f64; 3]| f64::from(luminance(rgb.map(|v| v as f32)));
         let (own, others) = (power(sun.irradiance.map(f64::from)), power(rest.map.map().integral()));
         let share = if own + others > 0.0 { (own / (own + others)) as f32 } else { 0.0 };
-        let n = sun.direction;
-        let helper = if n[2].abs() < 0.9 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
-        let u = unit(cross(helper, n));
         let half = (0.5 * f64::from(sun.radius)).sin();
         Self {
-            across: [u, cross(n, u)],
+            across: across(sun.direction.map(f64::from)).map(|v| v.map(|c| c as f32)),
             radiance: sun.radiance(),
             cap: (2.0 * half * half) as f32,
             share,
@@ -91,10 +89,6 @@ impl<'a> SplitSampler<'a> {
         let radiance = [0, 1, 2].map(|c| radiance[c] + self.radiance[c]);
         Sample { direction, radiance, pdf: rest + self.share / (2.0 * PI as f32 * self.cap) }
     }
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn unit(v: [f32; 3]) -> [f32; 3] {

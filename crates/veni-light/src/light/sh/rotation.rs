@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use super::{Basis, Sh};
+use crate::light::quadrature::gauss_legendre;
 
 impl<const L: usize> Sh<L> {
     /// The same light turned by `angle` radians about z, counter-clockwise seen from above: the pair (c_lm, c_l−m) turns by mα.
@@ -63,26 +64,4 @@ impl<const L: usize> Sh<L> {
         }
         out
     }
-}
-
-/// Nodes and weights of Gauss–Legendre quadrature on [−1, 1]: exact to degree 2n − 1.
-fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
-    let node = |k: usize| {
-        let mut x = (PI * (k as f64 + 0.75) / (n as f64 + 0.5)).cos();
-        let mut slope = 1.0;
-        for _ in 0..12 {
-            let (mut p, mut before) = (x, 1.0);
-            for l in 2..=n {
-                let l = l as f64;
-                (p, before) = (((2.0 * l - 1.0) * x * p - (l - 1.0) * before) / l, p);
-            }
-            if n == 1 {
-                (p, before) = (x, 1.0);
-            }
-            slope = n as f64 * (x * p - before) / (x * x - 1.0);
-            x -= p / slope;
-        }
-        (x, 2.0 / ((1.0 - x * x) * slope * slope))
-    };
-    (0..n).map(node).collect()
 }
