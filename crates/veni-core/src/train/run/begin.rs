@@ -14,7 +14,7 @@ use veni_light::output::{Lock, Overwrite, existing_above, write_atomic};
 use veni_light::progress::{Observer, Silent};
 
 impl Trainer {
-    /// Starts a run in `folder`, which must be free ([`is_free`](super::is_free)). `command` is recorded in the model file.
+    /// Starts a run in `folder`, which must be free ([`is_free`]). `command` is recorded in the model file.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the folder is in use or the configuration does not fit; what reading the data says.
@@ -41,7 +41,7 @@ impl Trainer {
         Self::fresh(folder, config, command, init.as_ref(), 0, observer)
     }
 
-    /// Makes the run's folder: from here on it can be continued. `lock` is the folder's ([`lock`](super::lock)) if the caller has it
+    /// Makes the run's folder: from here on it can be continued. `lock` is the folder's ([`lock`]) if the caller has it
     /// already.
     ///
     /// # Errors
