@@ -200,19 +200,19 @@ fn large_files_take_turns_and_a_larger_one_is_refused() {
         command.args(PREPARE).current_dir(dir.path("."));
         crate::util::finish(&mut command)
     };
-    // 8,388,608 pixels: 288 MiB each, two of which do not fit
+    // 8,388,608 pixels: 352 MiB each, two of which do not fit
     let dir = folder();
     for (k, name) in ["in/b.hdr", "in/c.hdr", "in/d.hdr"].into_iter().enumerate() {
         dir.write(name, hdr(4096, 2048, k + 2));
     }
-    let run = limited(&dir, 600 << 10);
+    let run = limited(&dir, 740 << 10);
     for name in ["b.exr", "c.exr", "d.exr"] {
         assert!(dir.path("data/train").join(name).is_file(), "{name}: {run:?}");
     }
     dir.write("in/huge.hdr", hdr(16384, 8192, 2));
     std::fs::remove_dir_all(dir.path("data")).unwrap();
-    let run = limited(&dir, 600 << 10);
-    checked(&dir, &run, "in/huge.hdr", &["need 4128 MiB of memory", "MiB are available"]);
+    let run = limited(&dir, 740 << 10);
+    checked(&dir, &run, "in/huge.hdr", &["need 5152 MiB of memory", "MiB are available"]);
     assert!(dir.path("data/train/d.exr").is_file(), "{run:?}");
 }
 
