@@ -21,7 +21,7 @@ use crate::{Error, Result};
 /// let light = Light::of(EnvironmentMap::new(grid, &pixels)?);
 /// assert!(light.sun().is_some_and(|sun| sun.elevation() > 0.8));
 /// let up = light.irradiance([0.0, 0.0, 1.0]);
-/// # assert!(up[0] > 30.0);
+/// # assert!((up[0] - 28.1).abs() < 0.3, "{up:?}");
 /// # Ok::<(), veni_light::Error>(())
 /// ```
 #[derive(Clone, Debug)]
