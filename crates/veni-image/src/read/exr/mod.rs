@@ -16,8 +16,8 @@ use exr::meta::attribute::{AttributeValue, EnvironmentMap, Text};
 use exr::meta::header::Header;
 use rayon::prelude::*;
 
-use super::ReadOptions;
 use super::meaning::Meaning;
+use super::{ReadOptions, precheck};
 use crate::limits::{MAX_EXR_BLOCK_BYTES, MAX_EXR_CHANNELS, MAX_EXR_CHUNKS, MAX_EXR_PARTS, at_most};
 use crate::numbered::join;
 use crate::{Error, Result};
@@ -31,6 +31,8 @@ pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -
         let choice = layers::choose(reader.headers(), options)?;
         let header = reader.headers()[choice.part].clone();
         let grid = judge(&header, options)?;
+        // the decoder's own view of the header: a damaged one may be walked through otherwise before
+        precheck::room(Some([grid.width as u64, grid.height as u64]), options)?;
         let attributes = text(&header);
         let meaning = if options.data {
             Meaning::linear()
