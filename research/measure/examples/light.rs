@@ -102,14 +102,7 @@ fn look(model: &Model, image: &[f32], factor: usize, share: f64) -> Result<Look>
 }
 
 fn irradiance_error(a: &[f32], b: &[f32]) -> f64 {
-    let ways: Vec<[f32; 3]> = (0..27)
-        .filter(|k| *k != 13)
-        .map(|k| {
-            let v = [k / 9, k / 3 % 3, k % 3].map(|c| c as f32 - 1.0);
-            let length = v.iter().map(|c| c * c).sum::<f32>().sqrt();
-            v.map(|c| c / length)
-        })
-        .collect();
+    let ways = veni_research::ways();
     let square = |way: &[f32; 3]| (irradiance(a, way) / irradiance(b, way)).ln().powi(2);
     (ways.par_iter().map(square).sum::<f64>() / ways.len() as f64).sqrt()
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Result, bail};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{ArgGroup, Args, ValueEnum};
 use serde_json::json;
 use veni_image::Panorama;
@@ -57,8 +58,8 @@ pub(crate) struct Ibl {
     seed: Option<u64>,
 
     /// Which engines, separated by commas
-    #[arg(long, short, value_enum, value_name = "ENGINE", value_delimiter = ',', required = true)]
-    engine: Vec<EngineName>,
+    #[arg(long, short, value_parser = engines(), value_name = "ENGINE", value_delimiter = ',', required = true)]
+    engine: Vec<Engine>,
 
     /// Folder to make
     #[arg(long, short, value_name = "DIR")]
@@ -109,49 +110,12 @@ enum SunMode {
     Keep,
 }
 
-/// The engines as they are typed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum EngineName {
-    /// Bevy 0.20: KTX2 cubes
-    Bevy,
-    /// Filament: KTX1 cubes with harmonics
-    Filament,
-    /// three.js r187: a KTX2 cube as PMREM
-    Three,
-    /// Godot 4: panorama and scene
-    Godot,
-    /// Babylon.js 9: .env
-    Babylon,
-    /// glTF with EXT_lights_image_based, for Babylon.js
-    Gltf,
-    /// pbrt-v4: equal-area square
-    Pbrt,
-    /// Mitsuba 3: panorama and XML
-    Mitsuba,
-    /// Blender: panorama and script
-    Blender,
-    /// USD: dome light and distant light
-    Usd,
-    /// EXR cubes, split-sum table and JSON for a renderer of your own
-    Any,
-}
-
-impl EngineName {
-    fn engine(self) -> Engine {
-        match self {
-            Self::Bevy => Engine::Bevy,
-            Self::Filament => Engine::Filament,
-            Self::Three => Engine::Three,
-            Self::Godot => Engine::Godot,
-            Self::Babylon => Engine::Babylon,
-            Self::Gltf => Engine::Gltf,
-            Self::Pbrt => Engine::Pbrt,
-            Self::Mitsuba => Engine::Mitsuba,
-            Self::Blender => Engine::Blender,
-            Self::Usd => Engine::Usd,
-            Self::Any => Engine::Any,
-        }
-    }
+/// The engines by their names.
+fn engines() -> impl TypedValueParser<Value = Engine> {
+    let values = Engine::ALL.map(|engine| PossibleValue::new(engine.name()).help(engine.takes()));
+    PossibleValuesParser::new(values).try_map(|name| {
+        Engine::ALL.into_iter().find(|engine| engine.name() == name).ok_or("no engine of that name")
+    })
 }
 
 /// Texels along a face.
@@ -237,8 +201,7 @@ impl Ibl {
     /// Each engine and its folder.
     fn folders(&self) -> Result<Vec<(Engine, PathBuf)>> {
         let mut folders: Vec<(Engine, PathBuf)> = Vec::new();
-        for name in &self.engine {
-            let engine = name.engine();
+        for engine in self.engine.iter().copied() {
             if folders.iter().any(|(other, _)| *other == engine) {
                 bail!("--engine names {} twice", engine.name());
             }

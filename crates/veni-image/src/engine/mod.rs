@@ -90,6 +90,23 @@ impl Engine {
         }
     }
 
+    /// Its version, and what its folder holds, in a few words.
+    pub fn takes(self) -> &'static str {
+        match self {
+            Self::Bevy => "Bevy 0.20: KTX2 cubes",
+            Self::Filament => "Filament: KTX1 cubes with harmonics",
+            Self::Three => "three.js r187: a KTX2 cube as PMREM",
+            Self::Godot => "Godot 4: panorama and scene",
+            Self::Babylon => "Babylon.js 9: .env",
+            Self::Gltf => "glTF with EXT_lights_image_based, for Babylon.js",
+            Self::Pbrt => "pbrt-v4: equal-area square",
+            Self::Mitsuba => "Mitsuba 3: panorama and XML",
+            Self::Blender => "Blender: panorama and script",
+            Self::Usd => "USD: dome light and distant light",
+            Self::Any => "EXR cubes, split-sum table and JSON for a renderer of your own",
+        }
+    }
+
     /// The prefiltered levels that it looks up, for faces of `size` texels; none where it filters by itself.
     pub fn levels(self, size: usize) -> Option<Levels> {
         match self {

@@ -53,14 +53,7 @@ fn decoded(model: &Model, encoder: &Encoder, panorama: &Panorama) -> Result<Vec<
 }
 
 fn error(field: &[[f32; 3]], lights: &[CompactLight], truth: EnvironmentMap<'_>) -> f64 {
-    let ways: Vec<[f32; 3]> = (0..27)
-        .filter(|k| *k != 13)
-        .map(|k| {
-            let v = [k / 9, k / 3 % 3, k % 3].map(|c| c as f32 - 1.0);
-            let length = v.iter().map(|c| c * c).sum::<f32>().sqrt();
-            v.map(|c| c / length)
-        })
-        .collect();
+    let ways = veni_research::ways();
     let y = |e: [f64; 3]| f64::from(luminance(e.map(|v| v as f32)));
     let square = |way: &[f32; 3]| {
         let field = EnvironmentMap::new(GRID, field)
