@@ -7,12 +7,12 @@
 # Python and Node packages of fixed versions go into target/readers; the other readers are the system's
 # (Debian: ffmpeg libfreeimage3 libtinyexr-dev g++).
 set -euo pipefail
+cli=${1:+$(realpath "$1")}
+shift || true
 cd "$(dirname "$0")"
 root=$(realpath ../..)
 target=$(realpath -m "${CARGO_TARGET_DIR:-$root/target}")
 packages=$target/readers
-cli=${1:-}
-shift || true
 if [[ -z $cli ]]; then
     (cd "$root" && cargo build --release -p veni-cli --no-default-features --features pretrained-large)
     cli=$target/release/veni-cli

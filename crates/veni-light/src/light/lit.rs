@@ -40,7 +40,7 @@ pub struct Light {
 /// How lights are told from the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightOptions {
-    /// Most lights, at most eight.
+    /// So many lights are kept at most, the sun first; up to eight. Whether there is a sun, and what it is, does not depend on it.
     pub lights: usize,
     /// A light's least share of the light on a surface that faces it.
     pub share: f32,
@@ -59,7 +59,7 @@ impl Default for LightOptions {
 }
 
 impl LightOptions {
-    /// The most lights that are taken out.
+    /// The most lights that are taken out; so many are always looked for.
     pub const MOST: usize = 8;
 
     /// The light of row-major `pixels`, which become the residual: no copy is made.
@@ -117,8 +117,12 @@ impl LightOptions {
     }
 
     fn split(&self, grid: Equirect, pixels: Vec<[f32; 3]>) -> Light {
-        let criteria =
-            Criteria { most: self.lights, share: f64::from(self.share), contrast: f64::from(self.contrast) };
+        let criteria = Criteria {
+            most: Self::MOST,
+            keep: self.lights,
+            share: f64::from(self.share),
+            contrast: f64::from(self.contrast),
+        };
         let Extracted { mut lights, sun, pixels, coarse } =
             Extraction::new(grid, pixels).run(criteria, self.sun);
         if let (Some(radius), true, Some(light)) = (self.sun_radius, sun, lights.first_mut()) {

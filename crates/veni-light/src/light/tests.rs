@@ -121,6 +121,36 @@ fn two_suns_are_two_lights_and_the_stronger_is_the_sun() {
 }
 
 #[test]
+fn fewer_lights_are_the_first_of_all_and_the_rest_is_put_back() {
+    let grid = Equirect::new(512, 256);
+    // within each other's caps: a sun, its wide glow, and a lamp in the glow
+    let put = [
+        disc(direction(30.0, 40.0), 0.8, [4.0, 3.6, 3.0]),
+        disc(direction(34.0, 43.0), 12.0, [1.5, 1.4, 1.2]),
+        disc(direction(20.0, 36.0), 1.0, [0.6, 0.7, 0.9]),
+        disc(direction(-140.0, 10.0), 1.5, [0.5, 0.4, 0.2]),
+    ];
+    let pixels = scene(grid, &put);
+    let all = light_of(grid, &pixels);
+    assert!(all.lights().len() >= 3 && all.sun().is_some(), "{:?}", all.lights());
+    let map = EnvironmentMap::new(grid, &pixels).unwrap();
+    for lights in 0..all.lights().len() {
+        let fewer = LightOptions { lights, ..LightOptions::default() }.of(map).unwrap();
+        assert_eq!(fewer.lights(), &all.lights()[..lights]);
+        assert_eq!(fewer.sun(), all.sun().filter(|_| lights > 0));
+        for (c, total) in map.integral().into_iter().enumerate() {
+            let lights: f64 = fewer.lights().iter().map(|l| f64::from(l.irradiance[c])).sum();
+            assert!(((fewer.residual().integral()[c] + lights) / total - 1.0).abs() < 1e-6);
+        }
+        let up = |light: &Light| f64::from(light.irradiance([0.0, 0.0, 1.0])[1]);
+        assert!((up(&fewer) / up(&all) - 1.0).abs() < 5e-3, "the coarse map is that of what is left");
+        if lights == 0 {
+            assert!(fewer.residual().pixels() == pixels, "nothing is taken");
+        }
+    }
+}
+
+#[test]
 fn lamps_in_a_dark_sky_are_lights_but_no_sun() {
     let grid = Equirect::new(512, 256);
     let lamps: Vec<_> = [(0.0, 20.0), (80.0, 15.0), (170.0, 10.0), (-90.0, 25.0)]

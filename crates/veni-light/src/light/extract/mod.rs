@@ -6,6 +6,8 @@ mod search;
 mod shape;
 mod sun;
 
+use std::ops::Range;
+
 use super::compact::{CompactLight, Kind};
 use super::luminance::luminance;
 use crate::light::vector::{angle, dot, normalised};
@@ -52,7 +54,10 @@ pub enum SunChoice {
 /// What is taken for a light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Criteria {
+    /// So many are looked for.
     pub(super) most: usize,
+    /// So many are kept, the sun first; the others are put back.
+    pub(super) keep: usize,
     pub(super) share: f64,
     pub(super) contrast: f64,
 }
@@ -62,6 +67,15 @@ pub(super) struct Extraction {
     pixels: Vec<[f32; 3]>,
     /// Finest first.
     levels: Vec<Level>,
+    /// What was taken, light by light, where some will be put back.
+    changes: Vec<Change>,
+}
+
+/// What taking a light changed.
+struct Change {
+    rows: Range<usize>,
+    /// Pixel, its radiance before and after.
+    pixels: Vec<(usize, [f32; 3], [f32; 3])>,
 }
 
 /// A light that was taken out.
@@ -74,6 +88,8 @@ struct Found {
     contrast: f64,
     /// Its peak luminance.
     peak: f64,
+    /// The how manyth it was to be found.
+    order: usize,
 }
 
 /// What an extraction gives.
@@ -94,20 +110,23 @@ impl Extraction {
         factors.extend(WIDTHS.iter().map(|w| grid.width.div_ceil(*w)).filter(|k| *k > 1));
         factors.dedup();
         let levels = factors.into_iter().map(|k| Level::new(grid, &pixels, k)).collect();
-        Self { pixels, levels }
+        Self { pixels, levels, changes: Vec::new() }
     }
 
-    /// Takes out lights until none is left that the criteria allow, and decides which is the sun.
+    /// Takes out lights until none is left that the criteria allow, and decides which is the sun. Which it is does not depend on
+    /// how many are kept.
     pub(super) fn run(mut self, criteria: Criteria, choice: SunChoice) -> Extracted {
         let mut found = Vec::new();
         let mut sun = None;
         if let SunChoice::Towards(direction) = choice
+            && criteria.keep > 0
             && let Some(measured) = self.near(direction)
         {
             found.push(self.take(&measured));
             sun = Some(0);
         }
-        let most = if choice == SunChoice::Nothing { 0 } else { criteria.most };
+        let nothing = choice == SunChoice::Nothing || criteria.keep == 0;
+        let most = if nothing { 0 } else { criteria.most };
         while found.len() < most {
             // a bright pixel among sixteen still stands out, and the seed is only near it
             let seeds = search::seeds(self.view(1.min(self.levels.len() - 1)), self.coarsest());
@@ -128,6 +147,9 @@ impl Extraction {
             if light.kind == Kind::Glow {
                 light.direction = *core;
             }
+        }
+        for f in found.drain(criteria.keep.min(found.len())..).rev() {
+            self.put_back(f.order);
         }
         let lights = found.into_iter().map(|f| f.light).collect();
         let coarse = self.levels.swap_remove(self.levels.len() - 1).keep(&self.pixels);
@@ -212,7 +234,7 @@ impl Extraction {
             }
             let taken = f64::from(luminance(cell.radiance)) - f64::from(luminance(rest));
             moment = [0, 1, 2].map(|c| moment[c] + cell.solid_angle * taken * cell.direction[c]);
-            changed.push((cell.index, rest));
+            changed.push((cell.index, cell.radiance, rest));
         });
         let pixel = self.levels[0].cell_angle();
         let fine = if measured.scale <= FINE.to_radians() { full } else { self.for_scale(measured.scale) };
@@ -235,13 +257,13 @@ impl Extraction {
                 radius = (2.0 * mean - 1.0).clamp(-1.0, 1.0).acos();
             }
         }
-        for (index, rest) in changed {
-            self.pixels[index] = rest;
+        for (index, _, rest) in &changed {
+            self.pixels[*index] = *rest;
         }
         let rows = self.levels[0].pixel_rows(measured.centre, measured.scale);
-        for level in &mut self.levels {
-            level.refresh(&self.pixels, rows.clone());
-        }
+        self.refresh(&rows);
+        let order = self.changes.len();
+        self.changes.push(Change { rows, pixels: changed });
         let light = CompactLight {
             direction: direction.map(|c| c as f32),
             irradiance: energy.map(|e| e as f32),
@@ -251,7 +273,26 @@ impl Extraction {
             share: (luminance_of(energy) / facing).min(1.0) as f32,
             clipped,
         };
-        Found { light, core: core.map(|c| c as f32), contrast: measured.contrast(), peak }
+        Found { light, core: core.map(|c| c as f32), contrast: measured.contrast(), peak, order }
+    }
+
+    /// Undoes a taking, whatever was taken since.
+    fn put_back(&mut self, order: usize) {
+        let Change { rows, pixels } =
+            std::mem::replace(&mut self.changes[order], Change { rows: 0..0, pixels: Vec::new() });
+        for (index, before, after) in pixels {
+            let pixel = &mut self.pixels[index];
+            *pixel = [0, 1, 2]
+                .map(|c| if pixel[c] == after[c] { before[c] } else { pixel[c] + (before[c] - after[c]) });
+        }
+        self.refresh(&rows);
+    }
+
+    /// Takes these rows of pixels into the coarser levels again.
+    fn refresh(&mut self, rows: &Range<usize>) {
+        for level in &mut self.levels {
+            level.refresh(&self.pixels, rows.clone());
+        }
     }
 
     /// Irradiance (luminance) of a surface that faces `direction`.
