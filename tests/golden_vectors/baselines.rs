@@ -74,7 +74,7 @@ fn harmonics_image(case: &Case) {
     compare(case, name, &basis.matrix(&reference::corner_directions(Equirect::new(width, height))));
 }
 
-/// The files give rows and columns by what they are, not by the authors' option.
+/// The files give rows and columns by what they are, not by the reference's option.
 fn gaussian_grid(case: &Case) -> Grid {
     let [columns, rows] = ["cols", "rows"].map(|n| case.size(n).expect("a size of the grid"));
     Grid::from_row_col_gaussian_dims([columns, rows])

@@ -1,4 +1,4 @@
-//! Equivariant layers: the authors' keys and axis orders against ours.
+//! Equivariant layers: the reference's keys and axis orders against ours.
 //!
 //! Every tensor of theirs is ours after a view and a permutation of axes: theirs is `[out, in]` with
 //! coordinates last, ours `[in, out]` with channels last. Without burn, as [`case`](super::case).
@@ -6,7 +6,7 @@
 use super::case::{Case, Data};
 use super::model::VectorLayer;
 
-/// One parameter: the authors' key and shape, that shape with axes split, the order of these in ours, our name.
+/// One parameter: the reference's key and shape, that shape with axes split, the order of these in ours, our name.
 pub(crate) struct Binding {
     pub(crate) key: String,
     pub(crate) shape: Vec<usize>,

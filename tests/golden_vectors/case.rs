@@ -45,7 +45,7 @@ impl Data {
         Self::new([], vec![value])
     }
 
-    /// Rows and columns exchanged: the authors' `[out, in]` to our `[in, out]` and back.
+    /// Rows and columns exchanged: the reference's `[out, in]` to our `[in, out]` and back.
     pub(crate) fn transposed(&self) -> Self {
         let [rows, columns] = self.shape[..] else {
             panic!("transposing a tensor of shape {:?}", self.shape)
@@ -60,7 +60,7 @@ impl Data {
 pub(crate) struct Case {
     /// File name without extension.
     pub(crate) name: String,
-    /// Hyper-parameters with the authors' option names.
+    /// Hyper-parameters with the reference's option names.
     pub(crate) config: Value,
     /// The file's remark, or empty.
     pub(crate) note: String,
@@ -153,7 +153,7 @@ impl Case {
         self.get(name).unwrap_or_else(|| panic!("the case has no tensor `{name}`"))
     }
 
-    /// The weight with the authors' key `key`: `param.<key>`, or generated for filler cases, where the
+    /// The weight with the reference's key `key`: `param.<key>`, or generated for filler cases, where the
     /// recorded first values `check.<key>` are verified. `None` where the case has neither.
     pub(crate) fn weight(&self, key: &str, shape: &[usize]) -> Option<Data> {
         if let Some(data) = self.get(&format!("param.{key}")) {

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 /// How far an f32 implementation may be off for one tensor.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tolerance {
-    /// Largest deviation of the authors' f32 run from the same computation in f64.
+    /// Largest deviation of the reference's f32 run from the same computation in f64.
     pub(crate) f32_err: f64,
     /// Largest magnitude; where the file has none, that of the tensor itself.
     pub(crate) max_abs: Option<f64>,

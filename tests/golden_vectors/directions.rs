@@ -1,4 +1,4 @@
-//! Directions and sampling: the authors' frames, samplers and lookup.
+//! Directions and sampling: the reference's frames, samplers and lookup.
 
 use crate::{
     Outcome,

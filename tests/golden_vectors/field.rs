@@ -44,7 +44,7 @@ fn is_reni_2022(case: &Case) -> bool {
     case.config.get("old_implementation").and_then(serde_json::Value::as_bool) == Some(true)
 }
 
-/// One of the field's parameters: the authors' key and shape, our name, whether ours is transposed.
+/// One of the field's parameters: the reference's key and shape, our name, whether ours is transposed.
 struct Binding {
     key: String,
     shape: Vec<usize>,
@@ -52,7 +52,7 @@ struct Binding {
     transposed: bool,
 }
 
-/// What the authors' network has and ours has not: it must have no effect.
+/// What the reference's network has and ours has not: it must have no effect.
 struct Dead {
     key: String,
 }
@@ -193,12 +193,12 @@ impl Sizes {
         (all, dead)
     }
 
-    /// Keys of the authors' weights that have no effect, under `prefix`.
+    /// Keys of the reference's weights that have no effect, under `prefix`.
     pub(crate) fn dead_keys(&self, prefix: &str) -> Vec<String> {
         self.bindings().1.into_iter().map(|dead| format!("{prefix}{}", dead.key)).collect()
     }
 
-    /// Our rows of a map in the authors' order, or theirs in ours: one row per input.
+    /// Our rows of a map in the reference's order, or theirs in ours: one row per input.
     fn reorder(&self, binding: &Binding, values: Vec<f32>, to_ours: bool) -> Vec<f32> {
         let Some(inputs) = self.inputs.as_ref().filter(|_| binding.ours == "input.weight") else {
             return values;
@@ -269,7 +269,7 @@ pub(crate) fn compare_records(case: &Case, sizes: &Sizes, record: &str, ours: &W
     }
 }
 
-/// Log radiance [B, R, 3] for latents and directions in the authors' axes, before the output activation.
+/// Log radiance [B, R, 3] for latents and directions in the reference's axes, before the output activation.
 fn decode(case: &Case, decoder: &Decoder, latent: Tensor<3>, directions: Tensor<2>) -> Tensor<3> {
     // RENI (2022) inside RENI++ swaps the directions' y and z, which have their axis z then
     let directions = if is_reni_2022(case) { directions } else { to_our_axis(case, directions) };
@@ -374,7 +374,7 @@ fn compare(case: &Case, device: &Device) -> Outcome {
     Compared
 }
 
-/// Pixel-centre directions of a map [H, W, 3] in the authors' decoder frame, rounded as theirs.
+/// Pixel-centre directions of a map [H, W, 3] in the reference's decoder frame, rounded as theirs.
 pub(crate) fn map_directions(shape: &[usize], device: &Device) -> Tensor<2> {
     let [height, width, 3] = shape[..] else { panic!("{shape:?} is not the shape of a map") };
     let grid = Equirect::new(width, height);

@@ -16,7 +16,7 @@ pub(crate) fn uniform(key: &str, seed: u64) -> impl Iterator<Item = f64> {
     })
 }
 
-/// Values of the weight with the authors' key `key`, row-major in the authors' shape.
+/// Values of the weight with the reference's key `key`, row-major in the reference's shape.
 pub(crate) fn weight(key: &str, shape: &[usize], seed: u64) -> Vec<f32> {
     let count: usize = shape.iter().product();
     let ends = |suffix: &str| key.ends_with(suffix);

@@ -1,4 +1,4 @@
-//! Latent optimisation under a fixed decoder: the authors' helper, and RENI++'s evaluation.
+//! Latent optimisation under a fixed decoder: the reference's helper, and RENI++'s evaluation.
 
 use crate::case::{Case, Data};
 use crate::fit_rounding::with_other_last_bits;
@@ -37,7 +37,7 @@ fn number(case: &Case, key: &str) -> f64 {
     case.number(key).unwrap_or_else(|| panic!("the configuration has no number `{key}`"))
 }
 
-/// Between the authors' decoder frame and ours, both ways: (x, y, z) → (−y, −x, z). Adam works on each
+/// Between the reference's decoder frame and ours, both ways: (x, y, z) → (−y, −x, z). Adam works on each
 /// coordinate alone and does not notice.
 fn across([x, y, z]: [f32; 3]) -> [f32; 3] {
     [-y, -x, z]
@@ -49,7 +49,7 @@ fn latents(data: &Data, batch: usize) -> Vec<Latent> {
     vectors.map(|z| Latent::new(z.as_chunks().0.iter().copied().map(across).collect())).collect()
 }
 
-/// A fit along the authors' directions, rounded as in their program: with steps of 0.1, the last bits of the
+/// A fit along the reference's directions, rounded as in their program: with steps of 0.1, the last bits of the
 /// directions change a latent coordinate by 1e-3 within 20 steps.
 fn run_fit(decoder: &Decoder, target: &FitTarget<'_>, start: &[Latent], config: &FitConfig) -> FitResult {
     let directions: Vec<_> = decoder_directions(target.grid()).into_iter().map(camera_to_native).collect();
@@ -62,7 +62,7 @@ fn compare(case: &Case, name: &str, values: Vec<f32>, deviation: f64) {
     case.compare_within(name, &Data::new(case.data(name).shape.clone(), values), deviation);
 }
 
-/// All coordinates, in the authors' frame.
+/// All coordinates, in the reference's frame.
 pub(crate) fn coordinates(fit: &FitResult) -> Vec<f32> {
     fit.latents.iter().flat_map(|z| z.vectors.iter().copied().flat_map(across)).collect()
 }

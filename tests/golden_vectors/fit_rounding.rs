@@ -49,7 +49,7 @@ fn the_allowance_for_fits_is_what_last_bits_cost() {
         allowed = allowed.max(allowance(&case));
         most_moved = most_moved.max(moved);
         let numbers = format!(
-            "{name}: other last bits of the weights move a coordinate by up to {moved:.1e}, the authors' numbers lie \
+            "{name}: other last bits of the weights move a coordinate by up to {moved:.1e}, the reference's numbers lie \
              {off:.1e} away; allowed: {allowed:.1e}"
         );
         eprintln!("{numbers}");

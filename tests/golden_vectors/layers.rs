@@ -70,7 +70,7 @@ fn kind(case: &Case, layer: VectorLayer) -> Kind {
     Kind { layer, invariants: coordinates(case) - 2 }
 }
 
-/// Which of the authors' packages a ReLU is from.
+/// Which of the reference's packages a ReLU is from.
 fn form(case: &Case, layer: VectorLayer) -> VnReluForm {
     let from = |key: &str, word: &str| case.text(key).is_some_and(|v| v.contains(word));
     let norm_guard = from("variant", "sox") || from("variant", "reni") || from("package", "reni");
@@ -133,7 +133,7 @@ fn vn_linear(case: &Case, device: &Device, layer: VectorLayer) {
     compare(case, device, module, &bindings, |m, x| same(case, m.forward(x)));
 }
 
-/// Our output in the authors' order, with the coordinates of the input.
+/// Our output in the reference's order, with the coordinates of the input.
 fn same(case: &Case, y: Tensor<4>) -> Tensor<4> {
     official(y, &coordinate_axes(case, "invariant_axes"))
 }

@@ -1,4 +1,4 @@
-//! Losses: the authors' forms against their numbers.
+//! Losses: the reference's forms against their numbers.
 
 use crate::case::Case;
 use crate::{Outcome, Outcome::Compared};

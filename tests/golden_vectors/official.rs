@@ -15,7 +15,7 @@ pub(crate) struct Official {
 }
 
 impl Official {
-    /// Reads the options in `options` (the authors' names); `prefix` stands before each key of the weights.
+    /// Reads the options in `options` (the reference's names); `prefix` stands before each key of the weights.
     pub(crate) fn new(case: &Case, options: &Value, prefix: &str) -> Self {
         let option = |key: &str| options.get(key).or_else(|| case.config.get(key)).unwrap_or(&Value::Null);
         let size = |key: &str| {
@@ -52,7 +52,7 @@ impl Official {
             },
             learnable_cls: flag("learnable_cls"),
             variational: flag("variational"),
-            // Each of the authors' files has its own guard.
+            // Each of the reference's files has its own guard.
             vn_relu: match transformer {
                 VectorLayer::Vn => VnReluForm::Reference,
                 VectorLayer::So2 => VnReluForm::ReferenceNormGuard,

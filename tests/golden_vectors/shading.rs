@@ -158,7 +158,7 @@ fn renderings(case: &Case) {
     }
 }
 
-/// Adam on latent and log exposure from 0, as the authors' figure does it.
+/// Adam on latent and log exposure from 0, as the reference's figure does it.
 fn inverse(case: &Case, device: &Device) {
     let number = |key: &str| case.number(key).unwrap_or_else(|| panic!("no number `{key}`"));
     let material =
@@ -205,7 +205,7 @@ fn inverse(case: &Case, device: &Device) {
             case.compare("out.grad0.latent", &latent);
             case.compare("out.grad0.scale", &Data::new([1], vec![exposure as f32]));
             // At latent 0 the light is the same all around z, and so is the rendering seen along z: the x and y of this
-            // gradient are 0 but for the authors' rounding, of which Adam makes full steps. So it is taken from them.
+            // gradient are 0 but for the reference's rounding, of which Adam makes full steps. So it is taken from them.
             let recorded = case.data("out.grad0.latent").values.iter();
             gradient.iter_mut().zip(recorded).for_each(|(g, r)| *g = f64::from(*r));
         }

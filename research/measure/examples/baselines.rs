@@ -1,7 +1,7 @@
 //! Fits the baselines to every panorama of a folder, at 128 × 64, and prints their mean scores as Markdown:
 //! `cargo run --release -p veni-research --example baselines -- FOLDER D [D …]`.
 //!
-//! Each cell is scored with an exposure factor first, then with the authors' factor on log radiance.
+//! Each cell is scored with an exposure factor first, then with the reference's factor on log radiance.
 
 #![allow(clippy::print_stdout, reason = "a program for a terminal")]
 
