@@ -5,10 +5,11 @@
 //! cargo run --release -p veni-gpu --example 6_wgsl > field.wgsl              # a function to paste
 //! cargo run --release -p veni-gpu --example 6_wgsl -- --module > field.wgsl  # a naga_oil module to import
 //! cargo run --release -p veni-gpu --example 6_wgsl -- --kernel > bake.wgsl   # a whole compute kernel
+//! cargo run --release -p veni-gpu --example 6_wgsl -- --light > light.wgsl   # importance sampling of a light
 //! ```
 //!
 //! `--model FILE` takes another model. What a host must bind is said on standard error. The buffers' content comes from
-//! `veni_gpu::shader::{pack_model, pack_latent}`, which need no graphics API either.
+//! `veni_gpu::shader::{pack_model, pack_latent, pack_light}`, which need no graphics API either.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ use veni_light::model::Model;
 
 /// Workgroup memory that every WebGPU device has, bytes.
 const WORKGROUP_MEMORY: u32 = 16 << 10;
-const USAGE: &str = "6_wgsl [--function | --module | --kernel] [--model FILE]";
+const USAGE: &str = "6_wgsl [--function | --module | --kernel | --light] [--model FILE]";
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../veni-light/assets/veni-27.safetensors");
@@ -26,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut args = std::env::args().skip(1);
     while let Some(arg) = args.next() {
         match arg.as_str() {
-            "--function" | "--module" | "--kernel" => what = arg,
+            "--function" | "--module" | "--kernel" | "--light" => what = arg,
             "--model" => path = PathBuf::from(args.next().ok_or("--model needs a file")?),
             _ => return Err(format!("unknown argument {arg}; {USAGE}").into()),
         }
@@ -39,6 +40,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             shader::field_module(sizes, 0, 0)
         }
         "--kernel" => kernel(sizes)?,
+        "--light" => {
+            eprintln!(
+                "veni_sample_light, veni_light_pdf, veni_sun, veni_irradiance; declare in a group and at bindings of your choice:"
+            );
+            eprint!("{}", shader::light_bindings(0, 0));
+            shader::light()
+        }
         _ => {
             eprintln!(
                 "fn veni_radiance(direction: vec3f) -> vec3f; declare in a group and at bindings of your choice:"

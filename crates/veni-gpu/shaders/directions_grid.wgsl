@@ -17,15 +17,5 @@ fn direction_of(index: u32) -> vec3f {
 
 // The lookup vector of a texel's centre, normalised.
 fn cube_direction(face: u32, texel: vec2u) -> vec3f {
-    let p = vec2f(2u * texel + 1u) / f32(request.width) - 1.0;
-    var v: vec3f;
-    switch face {
-        case 0u: { v = vec3f(1.0, -p.y, -p.x); }
-        case 1u: { v = vec3f(-1.0, -p.y, p.x); }
-        case 2u: { v = vec3f(p.x, 1.0, p.y); }
-        case 3u: { v = vec3f(p.x, -1.0, -p.y); }
-        case 4u: { v = vec3f(p.x, -p.y, 1.0); }
-        default: { v = vec3f(-p.x, -p.y, -1.0); }
-    }
-    return normalize(v);
+    return normalize(veni_cube_lookup(face, vec2f(2u * texel + 1u) / f32(request.width) - 1.0));
 }

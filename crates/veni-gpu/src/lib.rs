@@ -6,6 +6,9 @@
 //! faces, or radiances for a buffer of directions. Nothing here creates an instance, submits, or installs an error
 //! handler, except the conveniences in [`read_back`], [`adapters`] and [`probe`], which say so.
 //!
+//! A [`GpuLight`] holds a light's alias table and radiance for `veni_sample_light` and its kin, which a path tracer's own shader
+//! includes.
+//!
 //! [`shader`] has no wgpu types: WGSL text, sizes, binding layouts and packed weights for any API, and the function
 //! `veni_radiance` to paste into a path tracer. It is all that is left without the feature `wgpu`.
 //!
@@ -18,9 +21,13 @@ pub mod shader;
 #[cfg(feature = "wgpu")]
 pub mod adapters;
 #[cfg(feature = "wgpu")]
+mod buffers;
+#[cfg(feature = "wgpu")]
 pub mod decoder;
 #[cfg(feature = "wgpu")]
 pub mod error;
+#[cfg(feature = "wgpu")]
+pub mod light;
 #[cfg(feature = "wgpu")]
 pub mod probe;
 #[cfg(feature = "wgpu")]
@@ -32,5 +39,7 @@ mod scope;
 pub use decoder::{Bake, GpuDecoder, GpuLatents};
 #[cfg(feature = "wgpu")]
 pub use error::{Error, Result};
+#[cfg(feature = "wgpu")]
+pub use light::GpuLight;
 #[cfg(feature = "wgpu")]
 pub use wgpu;

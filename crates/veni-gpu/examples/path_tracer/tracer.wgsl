@@ -1,8 +1,8 @@
-// A small path tracer whose miss shader is the field. In front of this text the host puts `veni_radiance` and the
-// declaration of its three buffers (group 0).
+// A small path tracer. In front of this text the host puts the functions that sample the light (group 0) and `sky`, which is
+// the field (group 2) or the panorama that the light was made of.
 //
-// z is up and directions are native, so nothing is converted. The network is evaluated once per path, after the
-// walk, where the invocations of a subgroup meet again.
+// z is up and directions are native, so nothing is converted. The sky is asked once per path, after the walk, where the
+// invocations of a subgroup meet again: for the field that is the network.
 
 struct View {
     eye: vec3f,
@@ -14,6 +14,10 @@ struct View {
     up: vec3f,
     size_x: u32,
     size_y: u32,
+    // How diffuse surfaces draw directions: BSDF, LIGHT or MIS
+    sampler: u32,
+    // Pictures of other numbers are independent
+    seed: u32,
 }
 
 struct Sphere {
@@ -26,10 +30,8 @@ struct Sphere {
 
 @group(1) @binding(0) var<uniform> view: View;
 @group(1) @binding(1) var<storage, read> spheres: array<Sphere>;
-// Probability that a cell of the upper half of the sky comes before the i-th: LIGHT_COLUMNS x LIGHT_ROWS + 1 numbers.
-@group(1) @binding(2) var<storage, read> light: array<f32>;
 // Sum of the radiance of all paths, per pixel.
-@group(1) @binding(3) var<storage, read_write> picture: array<vec4f>;
+@group(1) @binding(2) var<storage, read_write> picture: array<vec4f>;
 
 const DIFFUSE: u32 = 0u;
 const METAL: u32 = 1u;
@@ -37,8 +39,8 @@ const GLASS: u32 = 2u;
 // Diffuse under a clear coat
 const COATED: u32 = 3u;
 
-const LIGHT_COLUMNS: u32 = 64u;
-const LIGHT_ROWS: u32 = 16u;
+const BSDF: u32 = 0u;
+const LIGHT: u32 = 1u;
 
 const PI: f32 = 3.1415927;
 const BOUNCES: u32 = 8u;
@@ -58,7 +60,7 @@ fn trace(@builtin(global_invocation_id) id: vec3u) {
     let path = walk(view.eye, normalize(view.forward + at.x * view.right - at.y * view.up));
     var radiance = vec3f();
     if path.escaped {
-        radiance = path.throughput * veni_radiance(path.direction);
+        radiance = path.throughput * sky(path.direction);
     }
     picture[index] += vec4f(radiance, 1.0);
 }
@@ -164,17 +166,28 @@ fn scatter(hit: Hit, back: vec3f, u: vec2f) -> Leaving {
     }
 }
 
-// Lambert's law. The direction is drawn either by the cosine or by where the sky is bright, with even chances; its
-// density is the mean of both (the balance heuristic with one sample), so neither strategy leaves bright dots.
+// Lambert's law. The direction is drawn by the cosine, by where the light is, or by either with even chances; the density of
+// that is the mean of both (the balance heuristic with one sample), so neither strategy leaves bright dots.
 fn diffused(hit: Hit, u: vec2f) -> Leaving {
     var direction: vec3f;
-    if u.x < 0.5 {
-        direction = normalize(hit.normal + on_sphere(vec2f(2.0 * u.x, u.y)));
+    var by_light: f32;
+    if view.sampler == BSDF || (view.sampler != LIGHT && u.x < 0.5) {
+        let stretched = select(2.0 * u.x, u.x, view.sampler == BSDF);
+        direction = normalize(hit.normal + on_sphere(vec2f(stretched, u.y)));
+        by_light = veni_light_pdf(direction);
     } else {
-        direction = towards_light(vec2f(2.0 * u.x - 1.0, u.y));
+        let stretched = select(2.0 * u.x - 1.0, u.x, view.sampler == LIGHT);
+        let sample = veni_sample_light(vec2f(stretched, u.y));
+        direction = sample.direction;
+        by_light = sample.pdf;
     }
     let cosine = max(dot(hit.normal, direction), 0.0);
-    let density = 0.5 * (cosine / PI + light_density(direction));
+    var density = 0.5 * (cosine / PI + by_light);
+    if view.sampler == BSDF {
+        density = cosine / PI;
+    } else if view.sampler == LIGHT {
+        density = by_light;
+    }
     return Leaving(direction, hit.colour * (cosine / PI / max(density, 1e-20)));
 }
 
@@ -245,46 +258,6 @@ fn on_sphere(u: vec2f) -> vec3f {
     return vec3f(r * cos(2.0 * PI * u.x), r * sin(2.0 * PI * u.x), z);
 }
 
-// A direction of the upper half, by the luminance of the table's cells: rows from the zenith down, columns from
-// azimuth pi on clockwise, as in a panorama.
-fn towards_light(u: vec2f) -> vec3f {
-    var low = 0u;
-    var high = LIGHT_COLUMNS * LIGHT_ROWS;
-    while high - low > 1u {
-        let middle = (low + high) / 2u;
-        if light[middle] <= u.x {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    let within = (u.x - light[low]) / (light[low + 1u] - light[low]);
-    let azimuth = PI - 2.0 * PI * (f32(low % LIGHT_COLUMNS) + within) / f32(LIGHT_COLUMNS);
-    let row = low / LIGHT_COLUMNS;
-    let z = mix(top_of(row), top_of(row + 1u), u.y);
-    let r = sqrt(max(0.0, 1.0 - z * z));
-    return vec3f(r * cos(azimuth), r * sin(azimuth), z);
-}
-
-// Density of `towards_light` per solid angle.
-fn light_density(direction: vec3f) -> f32 {
-    if direction.z <= 0.0 {
-        return 0.0;
-    }
-    let polar = acos(min(direction.z, 1.0)) / (0.5 * PI);
-    let row = min(u32(polar * f32(LIGHT_ROWS)), LIGHT_ROWS - 1u);
-    let turns = 0.5 - atan2(direction.y, direction.x) / (2.0 * PI);
-    let column = min(u32(max(turns, 0.0) * f32(LIGHT_COLUMNS)), LIGHT_COLUMNS - 1u);
-    let cell = row * LIGHT_COLUMNS + column;
-    let solid_angle = 2.0 * PI / f32(LIGHT_COLUMNS) * (top_of(row) - top_of(row + 1u));
-    return (light[cell + 1u] - light[cell]) / solid_angle;
-}
-
-// z of the upper edge of a row.
-fn top_of(row: u32) -> f32 {
-    return cos(0.5 * PI * f32(row) / f32(LIGHT_ROWS));
-}
-
 fn luminance(rgb: vec3f) -> f32 {
     return dot(rgb, vec3f(0.2126, 0.7152, 0.0722));
 }
@@ -296,7 +269,7 @@ fn luminance(rgb: vec3f) -> f32 {
 var<private> seed: u32;
 
 fn start_random(pixel: u32) {
-    seed = hash(pixel);
+    seed = hash(pixel ^ hash(view.seed));
 }
 
 // Two numbers, at least 0 and below 1.

@@ -6,7 +6,8 @@ use wgpu::{
 };
 
 use super::target::Target;
-use super::{Bake, GpuDecoder, GpuLatents, filled};
+use super::{Bake, GpuDecoder, GpuLatents};
+use crate::buffers::filled;
 use crate::error::{Error, Result};
 use crate::scope::guarded;
 use crate::shader::{Directions, Request, Store, Variant};

@@ -9,14 +9,14 @@ use std::fmt;
 
 use veni_light::field::Decoder;
 use veni_light::model::Model;
-use wgpu::{Buffer, BufferDescriptor, BufferUsages, Device};
+use wgpu::{Buffer, Device};
 
 pub use latents::GpuLatents;
 pub use target::Bake;
 pub(crate) use target::count;
 
+use crate::buffers::storage;
 use crate::error::{Error, Result};
-use crate::scope::guarded;
 use crate::shader::{Kernel, PackedModel, Sizes, Weights, pack_model};
 use pipelines::Pipelines;
 
@@ -156,27 +156,4 @@ fn choose(device: &Device, packed: &PackedModel, choice: KernelChoice) -> Result
     };
     let half = choice == KernelChoice::Auto && features.contains(wgpu::Features::SHADER_F16);
     Ok((kernel, if half { packed.matrices.to_half() } else { None }))
-}
-
-/// A read-only storage buffer with its content. Mapped at creation: no queue, no submission.
-fn storage(device: &Device, label: &str, bytes: &[u8]) -> Result<Buffer> {
-    let (size, most) = (bytes.len() as u64, device.limits().max_storage_buffer_binding_size);
-    if size > most {
-        return Err(Error::unsupported(format!(
-            "{label} take {size} bytes, the device binds at most {most} (max_storage_buffer_binding_size)"
-        )));
-    }
-    filled(device, label, BufferUsages::STORAGE, bytes)
-}
-
-/// A buffer with its content, of a length that is a multiple of four.
-fn filled(device: &Device, label: &str, usage: BufferUsages, bytes: &[u8]) -> Result<Buffer> {
-    let descriptor =
-        BufferDescriptor { label: Some(label), size: bytes.len() as u64, usage, mapped_at_creation: true };
-    let buffer = guarded(device, label, || device.create_buffer(&descriptor))?;
-    let mut mapped = buffer.slice(..).get_mapped_range_mut().map_err(|e| Error::gpu(label, e))?;
-    mapped.copy_from_slice(bytes);
-    drop(mapped);
-    buffer.unmap();
-    Ok(buffer)
 }

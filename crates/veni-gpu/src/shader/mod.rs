@@ -1,6 +1,6 @@
 //! The shaders as text, with everything a host needs to run them by any API. No wgpu types.
 //!
-//! Two ways in:
+//! Three ways in:
 //!
 //! - **A function** to paste or import: [`field`] gives WGSL with `fn veni_log_radiance(direction: vec3f) -> vec3f` and
 //!   `fn veni_radiance`, and no bindings inside. The host declares the three read-only storage buffers that
@@ -10,19 +10,34 @@
 //!   faces or a buffer of radiances; [`Variant::bindings`] its group 0, [`Request`] its uniform,
 //!   [`Variant::dispatches`] its dispatches.
 //!
+//! - **A light to sample**: [`light`] gives `veni_sample_light`, `veni_light_pdf`, `veni_sun` and `veni_irradiance` over the
+//!   buffers that [`pack_light`] fills and [`light_bindings`] declares.
+//!
 //! `twin` evaluates the same stages under the same names on the CPU in double precision, for comparing stage by
 //! stage.
 
+mod level;
+mod light_pack;
+mod light_text;
+mod light_uniform;
 mod pack;
 mod request;
 mod sizes;
+mod spectrum;
 mod text;
 pub mod twin;
 mod variant;
 
+pub use level::Level;
+pub use light_pack::{LightDensity, PackedLight, pack_light};
+pub use light_text::{light, light_bindings, light_module};
+pub use light_uniform::{LightUniform, MAX_LIGHTS, PackedDisc};
 pub use pack::{MatrixWords, PackedModel, pack_latent, pack_model};
 pub use request::{Grid, Request};
 pub use sizes::Sizes;
+pub use spectrum::{
+    LEVEL_ENTRY_POINT, MAX_DEGREE, SPECTRUM_ENTRY_POINTS, SpectrumTables, level_source, spectrum_source,
+};
 pub use text::{field, field_bindings, field_module, probe_source};
 pub use variant::{Binding, Directions, Kernel, MAX_GROUPS, Store, TexelFormat, Variant, Weights};
 

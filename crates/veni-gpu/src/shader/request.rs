@@ -81,7 +81,7 @@ impl Request {
             Grid::Cube { size } => (1, size, size),
             Grid::List { .. } => (0, 1, 1),
         };
-        let [x, y, z] = self.axes();
+        let [x, y, z] = axes(self.grid, self.frame, self.turn);
         let f = |v: [f32; 3]| v.map(f32::to_bits);
         let ([a, b, c], [d, e, g], [h, i, j]) = (f(x), f(y), f(z));
         let words = [
@@ -96,24 +96,22 @@ impl Request {
         bytes.as_chunks_mut::<4>().0.iter_mut().zip(words).for_each(|(b, w)| *b = w.to_le_bytes());
         bytes
     }
+}
 
-    /// What the coordinate axes of the directions are in the native frame of the unturned scene.
-    fn axes(&self) -> [[f32; 3]; 3] {
-        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let (sin, cos) = self.turn.sin_cos();
-        let (sin, cos) = (sin as f32, cos as f32);
-        axes.map(|axis| {
-            let axis = match self.grid {
-                Grid::Equirect { .. } => axis,
-                // Bevy's shaders negate z before they look a cube map up
-                Grid::Cube { .. } if self.frame == Frame::Bevy => {
-                    self.frame.to_native([axis[0], axis[1], -axis[2]])
-                }
-                _ => self.frame.to_native(axis),
-            };
-            // turning the scene by α looks up at −α
-            let [x, y, z] = axis;
-            [cos * x + sin * y, cos * y - sin * x, z]
-        })
-    }
+/// What the coordinate axes of directions are in the native frame of the unturned scene.
+pub(super) fn axes(grid: Grid, frame: Frame, turn: f64) -> [[f32; 3]; 3] {
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let (sin, cos) = turn.sin_cos();
+    let (sin, cos) = (sin as f32, cos as f32);
+    axes.map(|axis| {
+        let axis = match grid {
+            Grid::Equirect { .. } => axis,
+            // Bevy's shaders negate z before they look a cube map up
+            Grid::Cube { .. } if frame == Frame::Bevy => frame.to_native([axis[0], axis[1], -axis[2]]),
+            _ => frame.to_native(axis),
+        };
+        // turning the scene by α looks up at −α
+        let [x, y, z] = axis;
+        [cos * x + sin * y, cos * y - sin * x, z]
+    })
 }

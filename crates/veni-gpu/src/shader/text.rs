@@ -3,7 +3,9 @@
 use super::{Sizes, Weights};
 
 pub(super) const LAYOUT: &str = include_str!("../../shaders/layout.wgsl");
-pub(super) const ENCODE: &str = include_str!("../../shaders/encode.wgsl");
+pub(super) const TURNS: &str = include_str!("../../shaders/turns.wgsl");
+pub(super) const ENCODE: &str =
+    concat!(include_str!("../../shaders/turns.wgsl"), "\n", include_str!("../../shaders/encode.wgsl"));
 pub(super) const FIELD: &str = include_str!("../../shaders/field.wgsl");
 
 /// WGSL with `fn veni_log_radiance(direction: vec3f) -> vec3f` and `fn veni_radiance` of the first uploaded latent

@@ -179,7 +179,13 @@ impl Variant {
             Kernel::Tiled { memory, subgroups } => self.tiled(memory, subgroups),
         };
         let directions = match self.directions {
-            Directions::Grid => include_str!("../../shaders/directions_grid.wgsl"),
+            Directions::Grid => {
+                concat!(
+                    include_str!("../../shaders/cube.wgsl"),
+                    "\n",
+                    include_str!("../../shaders/directions_grid.wgsl")
+                )
+            }
             Directions::Buffer => include_str!("../../shaders/directions_buffer.wgsl"),
         };
         let store = match self.store {

@@ -8,6 +8,7 @@ mod breaks;
 mod cross_check;
 mod errors;
 mod kernels;
+mod light;
 #[cfg(unix)]
 mod memory;
 mod naga;

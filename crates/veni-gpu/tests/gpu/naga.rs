@@ -130,6 +130,54 @@ fn the_function_pastes_into_a_shader_of_its_own() {
     assert!(!shader::field(sizes).contains("@group"));
 }
 
+const SAMPLES: &str = "
+        @group(1) @binding(0) var<storage, read_write> out: array<vec4f>;
+        @compute @workgroup_size(64)
+        fn main(@builtin(global_invocation_id) id: vec3u) {
+            let s = veni_sample_light(vec2f(0.3, 0.6));
+            let t = veni_sun(vec2f(0.3, 0.6));
+            let e = veni_irradiance(s.direction) + veni_light_radiance(t.direction);
+            out[id.x] = vec4f(s.radiance + t.radiance + e, s.pdf + t.pdf + veni_light_pdf(t.direction));
+        }";
+
+#[test]
+fn the_lights_functions_paste_alone_and_beside_the_field() {
+    let light = format!("{}{}", shader::light_bindings(0, 3), shader::light());
+    assert!(!shader::light().contains("@group"));
+    let module = validate("light", &format!("{light}{SAMPLES}"), &[]);
+    assert_eq!(module.global_variables.len(), 4);
+    // the uniform is as long as the host makes it
+    let mut layouter = naga::proc::Layouter::default();
+    layouter.update(module.to_ctx()).unwrap();
+    let (_, uniform) =
+        module.global_variables.iter().find(|(_, v)| v.name.as_deref() == Some("veni_light")).unwrap();
+    assert_eq!(layouter[uniform.ty].size as usize, shader::LightUniform::BYTES);
+    let field = format!("{}{}", shader::field_bindings(0, 0, Weights::Single), shader::field(PAPER));
+    let both = SAMPLES.replace("s.radiance +", "s.radiance + veni_radiance(s.direction) +");
+    assert_eq!(validate("both", &format!("{field}{light}{both}"), &[]).global_variables.len(), 7);
+}
+
+#[test]
+fn the_lights_file_is_the_text() {
+    let file = include_str!("../../../../assets/veni_light.wgsl");
+    assert!(
+        file == shader::light(),
+        "out of date: cargo run --release -p veni-gpu --example 6_wgsl -- --light > assets/veni_light.wgsl"
+    );
+}
+
+#[test]
+fn the_lights_functions_import_as_a_naga_oil_module() {
+    let source = "
+        #import veni::light::{veni_sample_light, veni_light_pdf}
+        @fragment
+        fn sky(@location(0) u: vec2f) -> @location(0) vec4f {
+            let s = veni_sample_light(u);
+            return vec4f(s.radiance / s.pdf, veni_light_pdf(s.direction));
+        }";
+    assert_eq!(composed(&shader::light_module(1, 4), source), [(1, 4), (1, 5), (1, 6)]);
+}
+
 /// The copy of the function that lies in the repository for those who paste it.
 #[test]
 fn the_function_file_is_that_of_the_shipped_model() {
@@ -140,21 +188,14 @@ fn the_function_file_is_that_of_the_shipped_model() {
     );
 }
 
-#[test]
-fn the_function_imports_as_a_naga_oil_module() {
+/// The bindings of `source` after it has imported `module`.
+fn composed(module: &str, source: &str) -> Vec<(u32, u32)> {
     use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor};
     let mut composer = Composer::default();
-    let module = shader::field_module(PAPER, 2, 5);
     let added = composer
-        .add_composable_module(ComposableModuleDescriptor { source: &module, ..Default::default() })
+        .add_composable_module(ComposableModuleDescriptor { source: module, ..Default::default() })
         .map(drop);
     added.unwrap_or_else(|e| panic!("{}", e.emit_to_string(&composer)));
-    let source = "
-        #import veni::field::veni_radiance
-        @fragment
-        fn sky(@location(0) direction: vec3f) -> @location(0) vec4f {
-            return vec4f(veni_radiance(normalize(direction)), 1.0);
-        }";
     let composed = composer
         .make_naga_module(NagaModuleDescriptor { source, file_path: "sky.wgsl", ..Default::default() })
         .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&composer)));
@@ -165,7 +206,18 @@ fn the_function_imports_as_a_naga_oil_module() {
         .filter_map(|(_, v)| v.binding.map(|b| (b.group, b.binding)))
         .collect();
     bindings.sort_unstable();
-    assert_eq!(bindings, [(2, 5), (2, 6), (2, 7)]);
+    bindings
+}
+
+#[test]
+fn the_function_imports_as_a_naga_oil_module() {
+    let source = "
+        #import veni::field::veni_radiance
+        @fragment
+        fn sky(@location(0) direction: vec3f) -> @location(0) vec4f {
+            return vec4f(veni_radiance(normalize(direction)), 1.0);
+        }";
+    assert_eq!(composed(&shader::field_module(PAPER, 2, 5), source), [(2, 5), (2, 6), (2, 7)]);
 }
 
 #[test]

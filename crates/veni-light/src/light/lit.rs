@@ -176,6 +176,14 @@ impl Light {
         pixels
     }
 
+    /// The map with every light but the sun as a disc of its radius: what is sampled beside the sun.
+    pub fn without_sun(&self) -> Vec<[f32; 3]> {
+        let mut pixels = self.residual.clone();
+        let others = &self.lights[usize::from(self.sun().is_some())..];
+        others.iter().for_each(|light| light.add_to(self.grid, &mut pixels));
+        pixels
+    }
+
     /// Mean radiance over the sphere, lights included.
     pub fn mean(&self) -> [f32; 3] {
         let root = std::f64::consts::PI.sqrt();

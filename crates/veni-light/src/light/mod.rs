@@ -12,6 +12,7 @@
 //! | [`Spectrum`] | harmonics up to degrees in the hundreds |
 //! | [`Prefilter`], [`CubeMap`], [`Dfg`] | prefiltered maps, and the table that goes with them |
 //! | [`Sampler`], [`SplitSampler`] | directions drawn by how much light comes from them |
+//! | [`lobe_gains`], [`gauss_legendre`] | for spectra elsewhere: what a level makes of each degree, and a quadrature over latitudes |
 
 mod angle;
 mod compact;
@@ -35,7 +36,8 @@ pub use environment::EnvironmentMap;
 pub use extract::SunChoice;
 pub use lit::{Light, LightOptions};
 pub use luminance::{LUMINANCE, luminance};
-pub use prefilter::{CubeAxes, CubeMap, Dfg, Law, Levels, Prefilter};
+pub use prefilter::{CubeAxes, CubeMap, Dfg, Law, Levels, Prefilter, lobe_gains};
+pub use quadrature::gauss_legendre;
 pub use sampler::{Sample, Sampler, SplitSampler};
 pub use sh::Sh;
 pub use spectrum::{MAX_DEGREE, Spectrum};

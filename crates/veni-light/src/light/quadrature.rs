@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-/// Nodes in (−1, 1) and weights (which sum to 2) that integrate polynomials of degree 2n − 1 exactly.
-pub(super) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+/// Nodes in (−1, 1), the largest first, and weights (which sum to 2) that integrate polynomials of degree 2n − 1 exactly.
+pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     (0..n)
         .map(|i| {
             // Newton's method from the usual estimate; P_n and its derivative by the recurrence

@@ -1,14 +1,19 @@
-//! The shader stages on the CPU, under the same names and in the same order, in double precision on the same packed
-//! buffers. Slow and plain: for comparing a GPU's stages one by one, and as the truth in tests.
+//! The shader stages on the CPU, under the same names and in the same order, on the same packed buffers: the decoder in double
+//! precision, the light's functions in single. Slow and plain: for comparing a GPU's stages one by one, and as the truth in
+//! tests.
 
 mod directions;
 mod encode;
 mod field;
+mod light;
 mod output;
+mod spectrum;
 
 pub use directions::{direction_of, listed};
 pub use encode::{veni_encode, veni_sin_cos};
+pub use light::{LightTwin, VeniLightSample};
 pub use output::stored;
+pub use spectrum::{veni_degrees, veni_harmonics};
 
 use super::{PackedModel, Sizes};
 

@@ -68,7 +68,7 @@ impl<'a> Prefilter<'a> {
             return cube;
         }
         let alpha = p * p;
-        let rings = self.spectrum.convolved(&Lobe::new(alpha).gains(self.spectrum.degree(), TOLERANCE));
+        let rings = self.spectrum.convolved(&lobe_gains(p, self.spectrum.degree()));
         let glints: Vec<Glint> = self.lights.iter().map(|light| Glint::new(light, alpha)).collect();
         // texels wider than the lobe, and the smallest faces, are means; others are what the lobe gathers at their centre
         let texel = 2.0 / size as f64;
@@ -108,6 +108,16 @@ impl<'a> Prefilter<'a> {
     pub fn diffuse(&self, size: usize, axes: CubeAxes) -> CubeMap {
         self.level(1.0, size, axes)
     }
+}
+
+/// g_l, by which the level of perceptual roughness `p` multiplies degree l of the spectrum, for l = 0 … `degree` at most: as many as
+/// hold all but (3·10⁻⁴)² of the power of what the level makes of a point. g₀ = 1; at p = 1, A_l/π of the clamped cosine.
+///
+/// # Panics
+/// Unless `p` is in (0, 1].
+pub fn lobe_gains(p: f64, degree: usize) -> Vec<f64> {
+    assert!(p > 0.0 && p <= 1.0, "a level of roughness {p} is no convolution");
+    Lobe::new(p * p).gains(degree, TOLERANCE)
 }
 
 /// Enough for diffuse light: |A_l| / π of a cosine falls as l^−2.5.

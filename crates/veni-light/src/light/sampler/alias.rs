@@ -64,7 +64,11 @@ impl Alias {
             v = low - low.floor();
         }
         let Cell { keep, other } = self.cells[k];
-        if v < keep { (k, v / keep) } else { (other as usize, ((v - keep) / (1.0 - keep)).min(BELOW_ONE)) }
+        if v < keep {
+            (k, (v / keep).min(BELOW_ONE))
+        } else {
+            (other as usize, ((v - keep) / (1.0 - keep)).min(BELOW_ONE))
+        }
     }
 
     /// All cells: what a shader needs.

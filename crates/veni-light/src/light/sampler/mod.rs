@@ -158,9 +158,15 @@ impl<'a> Sampler<'a> {
         view.pixels()[row * width + column]
     }
 
+    /// The density with which a pixel of this radiance is drawn, 1/sr: scale · (luminance − floor)₊ + even.
     #[inline]
-    fn density(&self, radiance: [f32; 3]) -> f32 {
+    pub fn density(&self, radiance: [f32; 3]) -> f32 {
         self.scale * (luminance(radiance) - self.floor).max(0.0) + self.even
+    }
+
+    /// The map whose pixels are drawn, before any turn: means where it had more than 2²³.
+    pub fn map(&self) -> EnvironmentMap<'_> {
+        self.map.map()
     }
 
     /// The grid whose pixels are drawn.

@@ -48,6 +48,16 @@ impl<'a> SplitSampler<'a> {
         self.share
     }
 
+    /// The sun, its radius that of the disc that is drawn.
+    pub fn sun(&self) -> &CompactLight {
+        &self.sun
+    }
+
+    /// Two unit vectors across the sun's direction and each other, by which its disc is drawn: for a shader.
+    pub fn across(&self) -> [[f32; 3]; 2] {
+        self.across
+    }
+
     /// A direction from two numbers of [0, 1).
     #[inline]
     pub fn sample(&self, [u, v]: [f32; 2]) -> Sample {

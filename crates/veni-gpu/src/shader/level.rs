@@ -1,0 +1,57 @@
+//! The uniform of a level: `VeniLevel` in `level.wgsl`.
+
+use veni_light::sphere::Frame;
+
+use super::Grid;
+use super::request::axes;
+
+/// One level of a prefiltered cube map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Level {
+    /// Texels along an edge.
+    pub size: u32,
+    /// Whose axes name the faces.
+    pub frame: Frame,
+    /// Rotates the scene about z by this angle, radians, counter-clockwise seen from above.
+    pub turn: f64,
+    /// Largest degree of the coefficients.
+    pub degree: u32,
+    /// Largest degree that the level's lobe keeps.
+    pub kept: u32,
+    /// Where its gains begin in the buffer of all gains.
+    pub gains: u32,
+    /// A texel is the mean of this number of places, squared.
+    pub samples: u32,
+    /// Largest number that is stored.
+    pub largest: f32,
+}
+
+impl Level {
+    /// Bytes of the uniform.
+    pub const BYTES: usize = 64;
+
+    /// Places along a texel's edge: texels wider than the lobe of perceptual roughness `p`, and the smallest faces, are means;
+    /// others are what the lobe gathers at their centre, as in [`Prefilter::level`](veni_light::light::Prefilter::level).
+    pub fn samples(size: u32, p: f64) -> u32 {
+        let size = f64::from(size);
+        let least = if size < 8.0 { 32.0 / size } else { 1.0 };
+        (2.0 / (size * p * p)).ceil().max(least).min(16.0) as u32
+    }
+
+    /// The uniform, little endian as WGSL lays it out.
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let [x, y, z] =
+            axes(Grid::Cube { size: self.size }, self.frame, self.turn).map(|v| v.map(f32::to_bits));
+        let row = |[a, b, c]: [u32; 3], d: u32| [a, b, c, d];
+        let words = [
+            row(x, self.size),
+            row(y, self.degree),
+            row(z, self.kept),
+            [self.gains, self.samples, self.largest.to_bits(), 0],
+        ];
+        let mut bytes = [0; Self::BYTES];
+        let words = words.as_flattened().iter();
+        bytes.as_chunks_mut::<4>().0.iter_mut().zip(words).for_each(|(b, w)| *b = w.to_le_bytes());
+        bytes
+    }
+}
