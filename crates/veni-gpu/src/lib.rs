@@ -9,6 +9,8 @@
 //! A [`GpuLight`] holds a light's alias table and radiance for `veni_sample_light` and its kin, which a path tracer's own shader
 //! includes.
 //!
+//! A [`GpuPrefilter`] records what turns latents into spherical harmonics and prefiltered cube maps, without leaving the device.
+//!
 //! [`shader`] has no wgpu types: WGSL text, sizes, binding layouts and packed weights for any API, and the function
 //! `veni_radiance` to paste into a path tracer. It is all that is left without the feature `wgpu`.
 //!
@@ -29,6 +31,8 @@ pub mod error;
 #[cfg(feature = "wgpu")]
 pub mod light;
 #[cfg(feature = "wgpu")]
+pub mod prefilter;
+#[cfg(feature = "wgpu")]
 pub mod probe;
 #[cfg(feature = "wgpu")]
 pub mod read_back;
@@ -41,5 +45,7 @@ pub use decoder::{Bake, GpuDecoder, GpuLatents};
 pub use error::{Error, Result};
 #[cfg(feature = "wgpu")]
 pub use light::GpuLight;
+#[cfg(feature = "wgpu")]
+pub use prefilter::{GpuHarmonics, GpuPrefilter, PrefilteredCube};
 #[cfg(feature = "wgpu")]
 pub use wgpu;

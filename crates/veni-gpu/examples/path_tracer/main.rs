@@ -17,8 +17,9 @@
 //! - **The turn**: light comes from where it suits the scene, `--turn DEGREES` turns it otherwise: eight bytes for the sampler, a
 //!   turned latent for the field.
 //!
-//! `--compare` traces all three, twice each: the variance of a picture is half of what two of them differ by, at equal samples,
-//! and at the time that `bsdf` takes for them.
+//! `--compare` traces all three, twice each, with every surface diffuse (a mirror shows the sun whatever the sampler): the variance
+//! of a picture is half the mean square of what two of them differ by, at equal samples, and at the time that `bsdf` takes for
+//! them.
 //!
 //! The defaults are for adapters in software, such as Mesa's lavapipe. It compiles the network for some ten seconds the first
 //! time (then Mesa remembers it), and traces some thousand paths per second; under a panorama some hundred thousand.
@@ -69,7 +70,7 @@ fn main() -> Result<()> {
         );
     }
     let sky = sky(&opened, &options)?;
-    let tracer = Tracer::new(&opened, &sky, options.size);
+    let tracer = Tracer::new(&opened, &sky, &options);
     if options.compare {
         return compare(&tracer, &options);
     }

@@ -8,12 +8,13 @@ const LOOK_AT: [f32; 3] = [0.0, 0.0, 1.2];
 /// Tangent of half the horizontal angle of view.
 const HALF_WIDTH: f32 = 0.39;
 
-/// The uniform `View` for a picture of `size`, a sample, the first row of a portion, a sampler and a seed.
+/// The uniform `View` for a picture of `size`, a sample, the first row of a portion; then a sampler, a seed, and 1 if every surface is
+/// diffuse.
 pub(crate) fn view(
     size: [u32; 2],
     sample: u32,
     first_row: u32,
-    [sampler, seed]: [u32; 2],
+    [sampler, seed, diffuse]: [u32; 3],
 ) -> [u32; VIEW_WORDS] {
     let [width, height] = size;
     let sub = |a: [f32; 3], b: [f32; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -30,7 +31,7 @@ pub(crate) fn view(
         row(forward, sample),
         row(right.map(|v| v * HALF_WIDTH), first_row),
         row(up.map(|v| v * HALF_WIDTH * height as f32 / width as f32), width),
-        [height, sampler, seed, 0],
+        [height, sampler, seed, diffuse],
     ];
     bytemuck::cast(words)
 }

@@ -8,7 +8,7 @@ use veni_gpu::wgpu::{self, BufferUsages};
 use veni_gpu::{GpuDecoder, GpuLatents, GpuLight, read_back};
 
 use crate::Result;
-use crate::options::Strategy;
+use crate::options::{Options, Strategy};
 use crate::scene::{SPHERES, Sphere, VIEW_WORDS, view};
 
 /// Paths of a submission: work in small portions, so that no driver's watchdog takes it for a hang.
@@ -44,6 +44,7 @@ impl Sky {
 pub(crate) struct Tracer<'a> {
     opened: &'a Opened,
     size: [u32; 2],
+    diffuse: bool,
     pipeline: wgpu::ComputePipeline,
     lights: [wgpu::BindGroup; 2],
     field: Option<wgpu::BindGroup>,
@@ -53,8 +54,8 @@ pub(crate) struct Tracer<'a> {
 }
 
 impl<'a> Tracer<'a> {
-    pub(crate) fn new(opened: &'a Opened, sky: &Sky, size: [u32; 2]) -> Self {
-        let Opened { device, queue, .. } = opened;
+    pub(crate) fn new(opened: &'a Opened, sky: &Sky, options: &Options) -> Self {
+        let (Opened { device, queue, .. }, size) = (opened, options.size);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("path tracer"),
             source: wgpu::ShaderSource::Wgsl((sky.text() + include_str!("tracer.wgsl")).into()),
@@ -100,7 +101,7 @@ impl<'a> Tracer<'a> {
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let picture = buffer(16 * pixels, usage);
         let scene = group(1, &[&view, &spheres, &picture]);
-        Self { opened, size, pipeline, lights, field, scene, view, picture }
+        Self { opened, size, diffuse: options.compare, pipeline, lights, field, scene, view, picture }
     }
 
     /// The mean of so many paths per pixel, and the seconds that they took.
@@ -113,7 +114,8 @@ impl<'a> Tracer<'a> {
         let started = Instant::now();
         for sample in 0..samples {
             for first_row in (0..height).step_by(rows as usize) {
-                let uniform = view(self.size, sample, first_row, [strategy as u32, seed]);
+                let uniform =
+                    view(self.size, sample, first_row, [strategy as u32, seed, u32::from(self.diffuse)]);
                 self.submit(strategy, &uniform, rows.min(height - first_row));
                 self.opened.device.poll(wgpu::PollType::wait_indefinitely())?;
             }

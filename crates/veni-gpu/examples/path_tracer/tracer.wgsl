@@ -18,6 +18,8 @@ struct View {
     sampler: u32,
     // Pictures of other numbers are independent
     seed: u32,
+    // 1: every surface is diffuse
+    diffuse: u32,
 }
 
 struct Sphere {
@@ -83,7 +85,8 @@ fn walk(eye: vec3f, towards: vec3f) -> Path {
             return path;
         }
         origin += hit.distance * path.direction;
-        let leaving = scatter(hit, -path.direction, random_pair());
+        let material = select(hit.material, DIFFUSE, view.diffuse == 1u);
+        let leaving = scatter(hit, material, -path.direction, random_pair());
         path.direction = leaving.direction;
         path.throughput *= leaving.weight;
     }
@@ -139,8 +142,8 @@ struct Leaving {
 
 // `back` points to where the ray comes from; `u` is random. Every choice takes its part of u.x and stretches it again,
 // so that one well distributed pair serves a whole surface.
-fn scatter(hit: Hit, back: vec3f, u: vec2f) -> Leaving {
-    switch hit.material {
+fn scatter(hit: Hit, material: u32, back: vec3f, u: vec2f) -> Leaving {
+    switch material {
         case METAL: {
             let fresnel = hit.colour + (1.0 - hit.colour) * schlick(dot(hit.normal, back));
             return mirrored(hit, back, fresnel, u);

@@ -13,7 +13,7 @@ use wgpu::{Buffer, Device};
 
 pub use latents::GpuLatents;
 pub use target::Bake;
-pub(crate) use target::count;
+pub(crate) use target::{count, texture_grid};
 
 use crate::buffers::storage;
 use crate::error::{Error, Result};

@@ -133,7 +133,7 @@ impl<'a> Bake<'a> {
 }
 
 /// Grid and texels of a texture that can be written.
-fn texture_grid(texture: &Texture, cube: bool, latents: u32) -> Result<(Grid, TexelFormat)> {
+pub(crate) fn texture_grid(texture: &Texture, cube: bool, latents: u32) -> Result<(Grid, TexelFormat)> {
     let format = match texture.format() {
         TextureFormat::Rgba32Float => TexelFormat::Rgba32Float,
         TextureFormat::Rgba16Float => TexelFormat::Rgba16Float,

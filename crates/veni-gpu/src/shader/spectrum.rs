@@ -29,6 +29,9 @@ pub fn level_source(format: TexelFormat) -> String {
     [&level, include_str!("../../shaders/cube.wgsl")].join("\n")
 }
 
+/// A decoded field has something up to degrees in the hundreds: fewer rings take it for something else.
+const LEAST_RINGS: usize = 64;
+
 /// Where radiance is asked for, and the factors of the sums, for harmonics of all degrees up to L.
 #[derive(Clone, Debug)]
 pub struct SpectrumTables {
@@ -49,14 +52,22 @@ pub struct SpectrumTables {
 }
 
 impl SpectrumTables {
-    /// For harmonics up to `degree`. There are 1.5 rings per degree, so that a light that itself ends at twice the degree leaves no
-    /// trace of what is left out.
+    /// For harmonics up to `degree`, with two rings per degree and 64 at least: what the light has up to three times the degree leaves
+    /// no trace in them.
     ///
     /// # Panics
     /// If `degree` exceeds [`MAX_DEGREE`].
     pub fn new(degree: usize) -> Self {
+        Self::with_rings(degree, (2 * (degree + 1)).max(LEAST_RINGS))
+    }
+
+    /// The same with a number of rings of one's choice.
+    ///
+    /// # Panics
+    /// If `degree` exceeds [`MAX_DEGREE`], or there are fewer rings than degrees.
+    pub fn with_rings(degree: usize, rings: usize) -> Self {
         assert!(degree <= MAX_DEGREE, "degree {degree} is beyond {MAX_DEGREE}");
-        let rings = (3 * (degree + 1)).div_ceil(2).max(16);
+        assert!(rings > degree, "{rings} rings do not hold degree {degree}");
         let columns = 2 * rings;
         let basis = Basis::new(degree);
         let (nodes, mut values) = (gauss_legendre(rings), vec![0.0; basis.len()]);

@@ -12,6 +12,8 @@ mod light;
 #[cfg(unix)]
 mod memory;
 mod naga;
+mod prefilter;
+mod prefilter_by_hand;
 mod repetition;
 mod stages;
 mod util;

@@ -221,6 +221,22 @@ fn the_function_imports_as_a_naga_oil_module() {
 }
 
 #[test]
+fn harmonics_and_levels_are_valid() {
+    let module = validate("spectrum", shader::spectrum_source(), &[]);
+    let names: Vec<_> = module.entry_points.iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(names, shader::SPECTRUM_ENTRY_POINTS);
+    for format in [TexelFormat::Rgba32Float, TexelFormat::Rgba16Float] {
+        let module = validate("level", &shader::level_source(format), &[]);
+        assert_eq!(module.entry_points[0].name, shader::LEVEL_ENTRY_POINT);
+        let mut layouter = naga::proc::Layouter::default();
+        layouter.update(module.to_ctx()).unwrap();
+        let uniform =
+            module.global_variables.iter().find(|(_, v)| v.space == naga::AddressSpace::Uniform).unwrap().1;
+        assert_eq!(layouter[uniform.ty].size as usize, shader::Level::BYTES);
+    }
+}
+
+#[test]
 fn the_probe_is_valid() {
     validate("probe", &shader::probe_source(), &[]);
 }
