@@ -1,4 +1,23 @@
 //! [`GpuLight`]: a light on the host's device, for shaders that include [`shader::light`](crate::shader::light).
+//!
+//! ```no_run
+//! use veni_gpu::GpuLight;
+//! use veni_gpu::shader::{self, LightDensity, pack_light};
+//! use veni_gpu::wgpu::{Device, Queue};
+//! use veni_light::light::Light;
+//!
+//! /// Once: the text that stands in front of the host's own, and the buffers that it binds in group 1.
+//! fn load(device: &Device, light: &Light) -> Result<(String, GpuLight), Box<dyn std::error::Error>> {
+//!     // compensated: half of the samples are drawn by the surface, and the balance heuristic weighs them
+//!     let packed = pack_light(light, LightDensity::Compensated)?;
+//!     Ok((shader::light_bindings(1, 0) + &shader::light(), GpuLight::new(device, &packed)?))
+//! }
+//!
+//! /// Per frame: the sky turns.
+//! fn frame(light: &GpuLight, queue: &Queue, radians: f64) -> veni_gpu::Result<()> {
+//!     light.turn(queue, radians)
+//! }
+//! ```
 
 use wgpu::{Buffer, BufferUsages, Device, Queue};
 

@@ -1,7 +1,26 @@
 //! [`GpuPrefilter`]: harmonics and prefiltered cube maps of latents, without leaving the device.
 //!
-//! A latent's radiance on rings of latitude gives its spherical harmonics (LIGHT (16)); harmonics times one number per degree,
-//! summed in every direction, give a level (LIGHT (17)). Nothing is sampled at random, so nothing is noisy from frame to frame.
+//! A latent's radiance on rings of latitude gives its spherical harmonics (LIGHT (17)); harmonics times one number per degree,
+//! summed in every direction, give a level (LIGHT (18)). Nothing is sampled at random, so nothing is noisy from frame to frame.
+//!
+//! ```no_run
+//! use veni_gpu::wgpu::{CommandEncoder, Texture};
+//! use veni_gpu::{GpuDecoder, GpuHarmonics, GpuLatents, GpuPrefilter, PrefilteredCube, Result};
+//! use veni_light::light::Law;
+//! use veni_light::sphere::Frame;
+//!
+//! /// Per frame. `cube` has six layers and a mip chain; `GpuPrefilter::new`, `harmonics(1)` and `GpuDecoder::condition` came before.
+//! fn record(
+//!     (decoder, prefilter): (&GpuDecoder, &GpuPrefilter),
+//!     encoder: &mut CommandEncoder,
+//!     (latents, harmonics): (&GpuLatents, &GpuHarmonics),
+//!     cube: &Texture,
+//! ) -> Result<()> {
+//!     prefilter.analyse(encoder, decoder, latents, harmonics)?;
+//!     let cube = PrefilteredCube::new(cube, Law::Linear).frame(Frame::Bevy);
+//!     prefilter.bake(encoder, decoder, latents, harmonics, &cube)
+//! }
+//! ```
 
 mod analysis;
 mod cube;

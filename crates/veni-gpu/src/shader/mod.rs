@@ -1,6 +1,6 @@
 //! The shaders as text, with everything a host needs to run them by any API. No wgpu types.
 //!
-//! Three ways in:
+//! The ways in:
 //!
 //! - **A function** to paste or import: [`field`] gives WGSL with `fn veni_log_radiance(direction: vec3f) -> vec3f` and
 //!   `fn veni_radiance`, and no bindings inside. The host declares the three read-only storage buffers that
@@ -12,6 +12,8 @@
 //!
 //! - **A light to sample**: [`light`] gives `veni_sample_light`, `veni_light_pdf`, `veni_sun` and `veni_irradiance` over the
 //!   buffers that [`pack_light`] fills and [`light_bindings`] declares.
+//! - **Harmonics and levels**: [`spectrum_source`] and [`level_source`] are kernels over the tables of [`SpectrumTables`] and the
+//!   uniform [`Level`].
 //!
 //! `twin` evaluates the same stages under the same names on the CPU in double precision, for comparing stage by
 //! stage.
