@@ -1,6 +1,8 @@
 //! The twin against `veni_light::light`: no device.
 
 use veni_gpu::shader::twin::LightTwin;
+use veni_gpu::shader::{LightDensity, pack_light};
+use veni_light::light::Light;
 
 use super::{Cpu, FEW, apart, numbers, others, relative, skies};
 use crate::util::{directions, say};
@@ -62,4 +64,36 @@ fn the_twins_irradiance_is_that_of_lights_and_harmonics() {
             assert!(rms < 0.02);
         }
     }
+}
+
+/// What `veni_irradiance` leaves out by keeping nine harmonics, on the panoramas of the repository.
+#[test]
+fn nine_harmonics_are_enough_for_panoramas() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/panoramas");
+    let files = ["train", "val"].into_iter().flat_map(|part| std::fs::read_dir(folder.join(part)).unwrap());
+    let mut all: Vec<f64> = files
+        .map(|file| {
+            let panorama = veni_image::Panorama::read(file.unwrap().path()).unwrap();
+            let light = Light::of(panorama.environment().unwrap());
+            let twin = LightTwin::new(pack_light(&light, LightDensity::Luminance).unwrap());
+            let (mut off, mut whole) = (0.0, 0.0);
+            for n in directions(500) {
+                let (found, exact) = (twin.veni_irradiance(n), light.irradiance(n));
+                for c in 0..3 {
+                    off += f64::from(found[c] - exact[c]).powi(2);
+                    whole += f64::from(exact[c]).powi(2);
+                }
+            }
+            (off / whole).sqrt()
+        })
+        .collect();
+    all.sort_by(f64::total_cmp);
+    let (median, worst) = (all[all.len() / 2], all[all.len() - 1]);
+    say(&format!(
+        "{} panoramas: irradiance within {:.2} % RMS, {:.2} % at worst",
+        all.len(),
+        100.0 * median,
+        100.0 * worst
+    ));
+    assert!(all.len() == 16 && median < 0.01 && worst < 0.05);
 }
