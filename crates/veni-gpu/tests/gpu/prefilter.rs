@@ -7,7 +7,7 @@ use veni_gpu::{Bake, GpuDecoder, GpuHarmonics, GpuPrefilter, PrefilteredCube, re
 use veni_light::latent::Latent;
 use veni_light::light::{CubeAxes, EnvironmentMap, Law, Levels, Prefilter, Sh, lobe_gains};
 use veni_light::model::Model;
-use veni_light::sphere::{Equirect, Frame};
+use veni_light::sphere::{CubeFace, Equirect, Frame};
 
 use crate::util::{Gpu, filler, latent, plain, say};
 
@@ -231,6 +231,40 @@ fn the_twin_is_the_cpus_spectrum() {
         for (a, b) in a.into_iter().zip(sh.value(n)) {
             assert!((a - b / std::f64::consts::PI).abs() < 1e-3 * b.abs(), "{n:?}: {a} for {b}/π");
         }
+    }
+}
+
+/// The first level of a large chain, whose texels are narrower than its lobe: what the lobe keeps beyond the largest degree is
+/// missing there, and less of it for a larger one.
+#[test]
+fn narrow_lobes_lack_what_is_beyond_the_largest_degree() {
+    let model = pretrained();
+    let levels = Levels::new(256, 5, Law::Quadratic);
+    let (p, size) = (levels.roughness(1), levels.size(1));
+    for seed in [19, 7] {
+        let field = model.decoder().unwrap().condition(&sky(&model, seed)).unwrap();
+        let grid = Equirect { width: 1024, height: 512 };
+        let pixels = field.bake(grid);
+        let cpu = Prefilter::new(EnvironmentMap::new(grid, &pixels).unwrap(), &[levels]);
+        let expected = double(cpu.level(p, size, CubeAxes::NATIVE).texels());
+        let expected: Vec<_> = expected.into_iter().step_by(37).collect();
+        let centres = CubeFace::ALL.iter().flat_map(|face| face.directions(Frame::Blender, size)).step_by(37);
+        let centres: Vec<_> = centres.collect();
+        let off = [GpuPrefilter::DEGREE, 128].map(|degree| {
+            let tables = SpectrumTables::new(degree);
+            let directions: Vec<_> = tables.directions.iter().map(|[x, y, z, _]| [*x, *y, *z]).collect();
+            let mut radiance = vec![[0.0; 3]; directions.len()];
+            field.radiance_batch(&directions, &mut radiance);
+            let coefficients = veni_degrees(&tables, &radiance);
+            let gains = lobe_gains(p, degree);
+            let value = |d: &[f32; 3]| {
+                veni_harmonics(&tables, &gains, &coefficients, d.map(f64::from)).map(|v| v.max(0.0))
+            };
+            relative(&centres.iter().map(value).collect::<Vec<_>>(), &expected)
+        });
+        let [few, many] = off.map(|off| 100.0 * off);
+        say(&format!("seed {seed}, p = {p:.3}, {size} texels: {few:.2} % by 64 degrees, {many:.2} % by 128"));
+        assert!(off[0] < 0.03 && off[1] < 0.5 * off[0], "{off:?}");
     }
 }
 
