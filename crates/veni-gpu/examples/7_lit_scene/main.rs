@@ -24,7 +24,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use camera::{Camera, unit};
-use mesh::{Look, POLE_HEIGHT, WALL_AT, WALLS};
+use mesh::{Look, POLE_HEIGHT, WALLS, wall_at};
 use renderer::Renderer;
 use sky::Sky;
 use veni_gpu::wgpu;
@@ -115,7 +115,7 @@ impl Measured {
             *found = look(place, up, sky)?;
         }
         for (normal, found) in WALLS.into_iter().zip(&mut measured.walls) {
-            *found = look(WALL_AT, normal, &without)?;
+            *found = look(wall_at(normal), normal, &without)?;
         }
         Ok(measured)
     }

@@ -17,8 +17,11 @@ pub(crate) enum Look {
 
 pub(crate) const POLE_HEIGHT: f32 = 2.0;
 const POLE_RADIUS: f32 = 0.1;
-/// So far away that plane and pole are nothing.
-pub(crate) const WALL_AT: [f32; 3] = [1000.0, 500.0, -1000.0];
+/// Where the wall of a normal stands: so far away that plane and pole are nothing, and ten metres in front of the others.
+pub(crate) fn wall_at(normal: [f32; 3]) -> [f32; 3] {
+    let [x, y, z] = normal.map(|v| 10.0 * v);
+    [1000.0 + x, 500.0 + y, z - 1000.0]
+}
 /// Normals of the walls: native +x, +y, −x, −y.
 pub(crate) const WALLS: [[f32; 3]; 4] =
     [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
@@ -42,7 +45,7 @@ pub(crate) fn scene(look: Look) -> Vec<Vertex> {
             square(&mut mesh, [0.0; 3], up, 30.0, matt(1.0));
             pole(&mut mesh, matt(0.0));
             for normal in WALLS {
-                square(&mut mesh, WALL_AT, normal, 1.0, matt(1.0));
+                square(&mut mesh, wall_at(normal), normal, 1.0, matt(1.0));
             }
         }
     }
