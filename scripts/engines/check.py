@@ -50,7 +50,7 @@ def judge_levels(found, details):
     if found["harmonics"] > HARMONICS_BAR:
         faults.append(f"harmonics are off by {100 * found['harmonics']:.2f} %")
     worst = max(level["off"] for level in found["levels"])
-    return [f"levels {100 * worst:.2f} %", "-", f"nine {100 * found['harmonics']:.3f} %"], faults
+    return [f"levels {100 * worst:.2f} %", "-", f"nine {100 * found['harmonics']:.3f} %", "-"], faults
 
 
 def ask(python, script, asked, seconds):
@@ -86,7 +86,7 @@ def main():
         sky.write_hdr(folder / "sky.hdr", sky.panorama())
         sky.write_hdr(folder / "doubled.hdr", sky.panorama(strength=2))
         truth = scene.Truth(sky.read_hdr(folder / "sky.hdr"))
-        print(f"{'engine':<17} {'version':<16} {'plane':>13} {'shadow':>20} {'walls':>13} {'wrong folders':>14} {'s':>4}")
+        print(f"{'engine':<17} {'version':<16} {'plane':>13} {'shadow':>20} {'walls':>13} {'mirror':>8} {'wrong folders':>14} {'s':>4}")
         for name, script, engine, extra, pictured in chosen:
             started, place = time.monotonic(), folder / engine
             place.mkdir()
@@ -115,7 +115,7 @@ def main():
             shown, faults = judge("right")
             caught = {case: judge(case)[1] for case in ("turned", "doubled")}
             row = f"{sum(map(bool, caught.values()))}/2 caught"
-            print(f"{name:<17} {done['version']:<16} {shown[0]:>13} {shown[1]:>20} {shown[2]:>13} {row:>14} "
+            print(f"{name:<17} {done['version']:<16} {shown[0]:>13} {shown[1]:>20} {shown[2]:>13} {shown[3]:>8} {row:>14} "
                   f"{time.monotonic() - started:>4.0f}", flush=True)
             for fault in faults:
                 print(f"    WRONG: {fault}")

@@ -12,11 +12,16 @@ const told = TOLD, folders = FOLDERS, pictured = PICTURED, gltf = GLTF, out = do
 const vector = (v) => new BABYLON.Vector3(...v);
 
 async function build(folder, grey, width, height) {
-  const engine = new BABYLON.Engine(document.getElementById('c'), false), scene = new BABYLON.Scene(engine);
+  const canvas = document.getElementById('c');
+  canvas.width = width; canvas.height = height;  // cameras take their aspect from it
+  const engine = new BABYLON.Engine(canvas, false), scene = new BABYLON.Scene(engine);
   scene.imageProcessingConfiguration.applyByPostProcess = true;  // materials stay linear
   const camera = new BABYLON.FreeCamera('camera', new BABYLON.Vector3(0, 1, 0), scene);
   camera.minZ = 0.01;
-  if (gltf) await BABYLON.SceneLoader.AppendAsync(folder, 'sky.glb', scene);
+  if (gltf) {
+    await BABYLON.SceneLoader.AppendAsync(folder, 'sky.glb', scene);
+    scene.environmentTexture.gammaSpace = false;  // as README.txt says
+  }
   else (await import(folder + 'sky.js')).sky(BABYLON, scene, folder);
   const material = (v, metallic, roughness) => {
     const made = new BABYLON.PBRMaterial('m', scene);
@@ -41,7 +46,7 @@ async function build(folder, grey, width, height) {
   target.renderList = grey ? null : solid.slice(0, 1); target.activeCamera = camera; target.samples = 1;
   scene.customRenderTargets.push(target);
   await scene.whenReadyAsync();
-  return { engine, scene, camera, light, target, white: material(1, 0, 1) };
+  return { engine, scene, camera, light, target, white: material(1, 0, 1), mirror: material(1, 1, 0) };
 }
 
 async function look({ scene, target }) {
@@ -68,8 +73,12 @@ async function measure(folder) {
     wall.position = vector(told.wall_at).subtract(vector(n).scale(0.5));
     walls.push(await near(told.wall_at, n));
   }
+  const { at, radius } = told.ball, ball = BABYLON.MeshBuilder.CreateSphere('ball', { diameter: 2 * radius, segments: 128 }, scene);
+  ball.position = vector(at); ball.material = built.mirror; target.renderList.push(ball);
+  const mirrors = [];
+  for (const n of told.mirrors) mirrors.push(await near(at.map((v, k) => v + radius * n[k]), n));
   built.engine.dispose();
-  return { places, walls, walls_see_the_sun: false };
+  return { places, walls, walls_see_the_sun: false, mirrors };
 }
 
 async function picture(folder) {

@@ -45,12 +45,16 @@ def build(bpy, mathutils, folder, picture):
         bpy.context.object.rotation_mode = "QUATERNION"
         bpy.context.object.rotation_quaternion = turned_to(mathutils, normal)
         paint(bpy, bpy.context.object, 1)
+    if not picture:
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=256, ring_count=128, radius=TOLD["ball"]["radius"], location=TOLD["ball"]["at"])
+        bpy.ops.object.shade_smooth()
+        paint(bpy, bpy.context.object, 1, True, 0)
     script = folder / "sky.py"
     exec(compile(script.read_text(), script, "exec"), {"__file__": str(script)})
     built = bpy.context.scene
     built.render.engine = "CYCLES"
     built.cycles.use_denoising = built.cycles.use_adaptive_sampling = False
-    built.cycles.max_bounces = 8 if picture else 0
+    built.cycles.max_bounces = 8 if picture else 1
     # what metal throws on the ground is found by few paths: none may outshine its pixel
     built.cycles.sample_clamp_indirect = 3 if picture else 0
     built.view_settings.view_transform = "Raw"
@@ -95,7 +99,8 @@ def work(job_):
 
         places = [radiance(at, [0, 0, 1], samples) for at, samples in zip(TOLD["places"], (1024, 256, 256))]
         walls = [radiance(wall(n), n, 256) for n in TOLD["walls"]]
-        done["cases"][name] = {"places": places, "walls": walls, "walls_see_the_sun": True}
+        mirrors = [radiance(np.add(TOLD["ball"]["at"], np.multiply(n, TOLD["ball"]["radius"])), n, 16) for n in TOLD["mirrors"]]
+        done["cases"][name] = {"places": places, "walls": walls, "walls_see_the_sun": True, "mirrors": mirrors}
     if job_["picture"]:
         built = build(bpy, mathutils, job_["picture"], True)
         told, camera = TOLD["camera"], built.camera

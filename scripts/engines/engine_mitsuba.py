@@ -27,6 +27,10 @@ def build(mi, place, folder, picture):
         at, to = (", ".join(map(str, v)) for v in (wall(normal), np.add(wall(normal), normal)))
         lines.append(f'<shape type="rectangle"><transform name="to_world"><lookat origin="{at}" target="{to}" up="0, 1, 0"/></transform>'
                      f'{diffuse.format(1)}</shape>')
+    if not picture:
+        x, y, z = TOLD["ball"]["at"]
+        lines.append(f'<shape type="sphere"><point name="center" x="{x}" y="{y}" z="{z}"/><float name="radius" value="{TOLD["ball"]["radius"]}"/>'
+                     '<bsdf type="conductor"><string name="material" value="none"/></bsdf></shape>')
     path = place / "scene.xml"
     path.write_text('<scene version="3.0.0">' + "\n".join(lines) + "</scene>")
     return mi.load_file(str(path))
@@ -69,7 +73,8 @@ def work(job_):
         up = [0, 1, 0]
         places = [radiance(mi, built, at, up, samples) for at, samples in zip(TOLD["places"], (16384, 1024, 1024))]
         walls = [radiance(mi, built, wall(n), n, 1024) for n in TOLD["walls"]]
-        done["cases"][name] = {"places": places, "walls": walls, "walls_see_the_sun": True}
+        mirrors = [radiance(mi, built, np.add(TOLD["ball"]["at"], np.multiply(n, TOLD["ball"]["radius"])), n, 16) for n in TOLD["mirrors"]]
+        done["cases"][name] = {"places": places, "walls": walls, "walls_see_the_sun": True, "mirrors": mirrors}
     if job_["picture"]:
         done["pixels"] = picture(mi, build(mi, job_["place"], job_["picture"], True))
     return done

@@ -70,7 +70,12 @@ async function measure(folder) {
     scene.remove(wall);
     return value;
   });
-  return { places, walls, walls_see_the_sun: false };
+  const { at, radius } = told.ball;
+  const ball = new THREE.Mesh(new THREE.SphereGeometry(radius, 256, 128), new THREE.MeshStandardMaterial({ color: 0xffffff, roughness: 0, metalness: 1 }));
+  ball.position.set(...at);
+  scene.add(ball);
+  const mirrors = told.mirrors.map((n) => near(scene, at.map((v, k) => v + radius * n[k]), new THREE.Vector3(...n)));
+  return { places, walls, walls_see_the_sun: false, mirrors };
 }
 
 async function picture(folder) {

@@ -18,10 +18,14 @@ def work(asked):
         return subprocess.run([program, folder, "--json", *options], check=True, capture_output=True, text=True).stdout
 
     # it measures beside the pole where it is told that the sun should be
-    towards = ",".join(map(str, scene.told("three")["places"][2]))
+    told = scene.told("three")
+    listed = lambda v: ",".join(map(str, v))
+    directions = ["--sun", listed(told["places"][2])]
+    for mirror in told["mirrors"]:
+        directions += ["--mirror", listed(mirror)]
     done = {"version": "30", "cases": {}}
     for name, folder in asked["folders"].items():
-        done["cases"][name] = {**json.loads(run(folder, "--sun", towards)), "walls_see_the_sun": False}
+        done["cases"][name] = {**json.loads(run(folder, *directions)), "walls_see_the_sun": False}
     if asked["picture"]:
         width, height = scene.SIZE
         raw = asked["place"] / "picture.raw"

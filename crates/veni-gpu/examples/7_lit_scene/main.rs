@@ -24,7 +24,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use camera::{Camera, unit};
-use mesh::{Look, POLE_HEIGHT, WALLS, wall_at};
+use mesh::{BALL_AT, BALL_RADIUS, Look, POLE_HEIGHT, WALLS, wall_at};
 use renderer::Renderer;
 use sky::Sky;
 use veni_gpu::wgpu;
@@ -32,7 +32,8 @@ use veni_image::{luminance, tonemap::srgb};
 
 type Result<T, E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
-const USAGE: &str = "7_lit_scene [FOLDER] [-o FILE.png] [--size WxH] [--json] [--sun X,Y,Z] [--raw FILE]";
+const USAGE: &str =
+    "7_lit_scene [FOLDER] [-o FILE.png] [--size WxH] [--json] [--sun X,Y,Z] [--raw FILE] [--mirror X,Y,Z]…";
 /// The most that the plane may be off.
 const BAR: f32 = 0.01;
 
@@ -60,10 +61,10 @@ fn main() -> Result<()> {
         eprintln!("{}", file.display());
     }
     let towards = options.sun.or(sky.sun.as_ref().map(|sun| sun.direction)).unwrap_or([1.0, 0.0, 0.0]);
-    let measured = Measured::of(&renderer, &sky, towards)?;
+    let measured = Measured::of(&renderer, &sky, towards, &options.mirrors)?;
     let expected = sky.irradiance_of_the_ground().map(|e| e / PI);
     if options.json {
-        let line = serde_json::json!({ "places": measured.places, "walls": measured.walls, "adapter": adapter.get_info().name });
+        let line = serde_json::json!({ "places": measured.places, "walls": measured.walls, "mirrors": measured.mirrors, "adapter": adapter.get_info().name });
         writeln!(std::io::stdout(), "{line}")?;
         return Ok(());
     }
@@ -84,7 +85,7 @@ fn still_notices(renderer: &Renderer, sky: &Sky, towards: [f32; 3], expected: [f
     turned.direction = [z, y, -x];
     for (sun, what) in [(doubled, "twice as strong"), (turned, "turned")] {
         let wrong = Sky { sun: Some(sun), ..sky.clone() };
-        let fault = Measured::of(renderer, &wrong, towards)?.fault(expected, true);
+        let fault = Measured::of(renderer, &wrong, towards, &[])?.fault(expected, true);
         let fault = fault.ok_or_else(|| format!("a sun {what} is not noticed"))?;
         writeln!(std::io::stdout(), "a sun {what} is noticed: {fault}")?;
     }
@@ -97,10 +98,12 @@ struct Measured {
     places: [[f32; 3]; 3],
     /// Walls far away that see the sky alone, without the sun.
     walls: [[f32; 3]; 4],
+    /// A mirror, seen along some normals: the sky in these directions.
+    mirrors: Vec<[f32; 3]>,
 }
 
 impl Measured {
-    fn of(renderer: &Renderer, sky: &Sky, towards: [f32; 3]) -> Result<Self> {
+    fn of(renderer: &Renderer, sky: &Sky, towards: [f32; 3], mirrors: &[[f32; 3]]) -> Result<Self> {
         let [x, _, z] = unit([towards[0], 0.0, towards[2]]);
         let without = Sky { sun: None, ..sky.clone() };
         let look = |at: [f32; 3], normal, sky| {
@@ -110,12 +113,16 @@ impl Measured {
         };
         let up = [0.0, 1.0, 0.0];
         let places = [[12.0, 0.0, 12.0], [-x, 0.0, -z], [x, 0.0, z]];
-        let mut measured = Self { places: [[0.0; 3]; 3], walls: [[0.0; 3]; 4] };
+        let mut measured = Self { places: [[0.0; 3]; 3], walls: [[0.0; 3]; 4], mirrors: Vec::new() };
         for (place, found) in places.into_iter().zip(&mut measured.places) {
             *found = look(place, up, sky)?;
         }
         for (normal, found) in WALLS.into_iter().zip(&mut measured.walls) {
             *found = look(wall_at(normal), normal, &without)?;
+        }
+        for &normal in mirrors {
+            let at = [0, 1, 2].map(|k| BALL_AT[k] + BALL_RADIUS * normal[k]);
+            measured.mirrors.push(look(at, normal, &without)?);
         }
         Ok(measured)
     }
@@ -195,12 +202,21 @@ struct Options {
     sun: Option<[f32; 3]>,
     /// The picture's radiance, f32.
     raw: Option<PathBuf>,
+    /// Directions in which the mirror is looked at.
+    mirrors: Vec<[f32; 3]>,
 }
 
 impl Options {
     fn from_args() -> Result<Self> {
-        let mut options =
-            Self { folder: None, out: None, size: [360, 270], json: false, sun: None, raw: None };
+        let mut options = Self {
+            folder: None,
+            out: None,
+            size: [360, 270],
+            json: false,
+            sun: None,
+            raw: None,
+            mirrors: Vec::new(),
+        };
         let mut args = std::env::args().skip(1);
         while let Some(name) = args.next() {
             let mut value = || args.next().ok_or_else(|| format!("{name} needs a value; {USAGE}"));
@@ -214,15 +230,18 @@ impl Options {
                     let (width, height) = value.split_once('x').ok_or_else(|| wrong(&value))?;
                     options.size = [width.parse()?, height.parse()?];
                 }
-                "--sun" => {
-                    let value = value()?;
-                    let numbers: Vec<f32> = value.split(',').map(str::parse).collect::<Result<_, _>>()?;
-                    options.sun = Some(numbers.try_into().map_err(|_| wrong(&value))?);
-                }
+                "--sun" => options.sun = Some(direction(&value()?)?),
+                "--mirror" => options.mirrors.push(direction(&value()?)?),
                 _ if name.starts_with('-') => return Err(format!("unknown argument {name}; {USAGE}").into()),
                 _ => options.folder = Some(name.into()),
             }
         }
         Ok(options)
     }
+}
+
+/// X,Y,Z in the renderer's axes.
+fn direction(text: &str) -> Result<[f32; 3]> {
+    let numbers: Vec<f32> = text.split(',').map(str::parse).collect::<Result<_, _>>()?;
+    Ok(numbers.try_into().map_err(|_| format!("{text}: not X,Y,Z"))?)
 }

@@ -1,5 +1,5 @@
-//! The scene as triangles: a plane, a pole, a white sphere and a rough metal one; or, to measure light, plane and walls in white and a
-//! black pole.
+//! The scene as triangles: a plane, a pole, a white sphere and a rough metal one; or, to measure light, plane and walls in white, a
+//! black pole and a mirror.
 
 use std::f32::consts::{PI, TAU};
 
@@ -22,6 +22,9 @@ pub(crate) fn wall_at(normal: [f32; 3]) -> [f32; 3] {
     let [x, y, z] = normal.map(|v| 10.0 * v);
     [1000.0 + x, 500.0 + y, z - 1000.0]
 }
+/// A mirror ball, as far away, and where it is looked at along its normals.
+pub(crate) const BALL_AT: [f32; 3] = [-1000.0, 500.0, -1000.0];
+pub(crate) const BALL_RADIUS: f32 = 20.0;
 /// Normals of the walls: native +x, +y, −x, −y.
 pub(crate) const WALLS: [[f32; 3]; 4] =
     [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
@@ -44,6 +47,7 @@ pub(crate) fn scene(look: Look) -> Vec<Vertex> {
         Look::White => {
             square(&mut mesh, [0.0; 3], up, 30.0, matt(1.0));
             pole(&mut mesh, matt(0.0));
+            sphere(&mut mesh, BALL_AT, BALL_RADIUS, [1.0, 1.0, 0.0]);
             for normal in WALLS {
                 square(&mut mesh, wall_at(normal), normal, 1.0, matt(1.0));
             }

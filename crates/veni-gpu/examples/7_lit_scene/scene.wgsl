@@ -61,7 +61,9 @@ fn sun_seen(place: vec3f, normal: vec3f) -> f32 {
 }
 
 // GGX with height-correlated Smith visibility, times n·l.
-fn gloss(n: vec3f, v: vec3f, l: vec3f, f0: f32, roughness: f32) -> f32 {
+fn gloss(n: vec3f, v: vec3f, l: vec3f, f0: f32, perceptual: f32) -> f32 {
+    // a mirror shows a sun without size nowhere
+    let roughness = max(perceptual, 0.03);
     let h = normalize(v + l);
     let nl = max(dot(n, l), 0.0);
     let nv = max(dot(n, v), 1e-4);

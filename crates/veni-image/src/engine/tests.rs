@@ -211,7 +211,8 @@ fn babylon_sees_what_is_there() {
         // left-handed: centre at +z, left at −x, right at +x, seam at −z
         let v = [[0., 0., 1.], [-1., 0., 0.], [0., 1., 0.]];
         looks_up("babylon", v, 32, |face, row, column| {
-            from_rgbd(faces[face].get_pixel(column as u32, row as u32).0)
+            // the first row of an image is the bottom of a face
+            from_rgbd(faces[face].get_pixel(column as u32, 31 - row as u32).0)
         });
         let code = text(folder, "sky.js");
         // native (x, y, z) is (−y, z, x)
@@ -304,7 +305,9 @@ fn a_glb_holds_every_face_and_the_sun() {
             let view = &json["bufferViews"][face];
             let at = view["byteOffset"].as_u64().unwrap() as usize;
             let png = &data[at..at + view["byteLength"].as_u64().unwrap() as usize];
-            from_rgbd(image::load_from_memory(png).unwrap().to_rgba8().get_pixel(column as u32, row as u32).0)
+            let face = image::load_from_memory(png).unwrap().to_rgba8();
+            // the first row of an image is the bottom of a face
+            from_rgbd(face.get_pixel(column as u32, 31 - row as u32).0)
         });
         let z: Vec<f64> = (8..11).map(|k| json["nodes"][0]["matrix"][k].as_f64().unwrap()).collect();
         assert!(z.iter().zip([0.48, 0.6, -0.64]).all(|(a, b)| (a - b).abs() < 1e-4), "{z:?}");
