@@ -25,9 +25,9 @@ while (($#)); do
     esac
     shift
 done
-cd "$(dirname "$0")"
-root=$(realpath ../..)
+root=$(realpath "$(dirname "$0")/../..")
 target=$(realpath -m "${CARGO_TARGET_DIR:-$root/target}")
+cd "$root/scripts/engines"
 packages=$target/engines
 said=" ${arguments[*]-} "
 wants() { [[ $said != *" --only "* || ${said,,} == *" $1"* ]]; }
@@ -35,7 +35,7 @@ wants() { [[ $said != *" --only "* || ${said,,} == *" $1"* ]]; }
 fetch() {
     local what=$1
     shift
-    timeout 240 "$@" && return
+    timeout 120 "$@" && return
     echo "engines: $what cannot be fetched" >&2
     return 1
 }
@@ -47,21 +47,27 @@ fi
 mkdir -p "$packages"
 
 need=()
-wants three.js || wants babylon.js && ! command -v chromium chromium-browser google-chrome >/dev/null && need+=(chromium)
-wants cmgen && ! command -v cmgen >/dev/null && need+=(libfilament-tools)
+browser() { command -v chromium || command -v chromium-browser || command -v google-chrome; }
+if wants three.js || wants babylon.js; then
+    browser >/dev/null || need+=(chromium)
+fi
+if wants cmgen; then
+    command -v cmgen >/dev/null || need+=(libfilament-tools)
+fi
+python3 -c 'import ensurepip, venv' 2>/dev/null || need+=(python3-venv)
 if ((${#need[@]})) && [[ ${VENI_INSTALL:-0} == 1 ]] && command -v apt-get >/dev/null && ((EUID == 0)); then
     export DEBIAN_FRONTEND=noninteractive
     fetch "${need[*]}" bash -c 'apt-get update -qq && apt-get install -qq --no-install-recommends "$@" >/dev/null' - "${need[@]}" || true
 fi
 
-# everything of Python's runs in here, numpy's sums too
+# without Python there is no sum to compare with
 if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
     echo "engines: python3 with venv is not installed: no engine is checked"
     exit 3
 fi
 python=$packages/python/bin/python
 install() {
-    cmp -s "$1" "$packages/$1" && return
+    ! cmp -s "$1" "$packages/$1" || return 0
     [[ -x $python ]] || python3 -m venv "$packages/python"
     fetch "what $1 lists" "$python" -m pip install --quiet --disable-pip-version-check -r "$1" && cp "$1" "$packages/$1"
 }
@@ -69,16 +75,22 @@ if ! install requirements.txt; then
     echo "engines: without numpy no engine is checked"
     exit 3
 fi
-wants blender && { install blender.txt || true; }
+if wants blender; then
+    install blender.txt || true
+fi
 if wants three.js || wants babylon.js; then
     npm=(npm install --silent --no-audit --no-fund --no-package-lock --ignore-scripts --prefix "$packages")
     # Babylon.js is large, and optional
     wants babylon.js || npm+=(--omit=optional)
     installed=$packages/node_modules/package.json
-    wants babylon.js && installed=$packages/node_modules/package-all.json
-    if command -v npm >/dev/null && ! cmp -s package.json "$installed"; then
+    ! wants babylon.js || installed=$packages/node_modules/package-all.json
+    if ! command -v npm >/dev/null; then
+        echo "engines: npm is not installed" >&2
+    elif ! cmp -s package.json "$installed"; then
         cp package.json "$packages/package.json"
-        fetch "what package.json lists" "${npm[@]}" && cp package.json "$installed"
-    fi || true
+        if fetch "what package.json lists" "${npm[@]}"; then
+            cp package.json "$installed"
+        fi
+    fi
 fi
 exec "$python" check.py --cli "$cli" --packages "$packages" ${arguments[@]+"${arguments[@]}"}
