@@ -2,7 +2,7 @@
 # Whether engines agree with the folders that veni-cli makes for them: three.js, Babylon.js, Mitsuba, Blender, cmgen, and example
 # 7 on wgpu. A table, and exit code 1 where one disagrees, 3 where none is installed. What is not installed is named.
 #   scripts/engines/check.sh [FILE]             the command line to check; without it, it is built
-#   scripts/engines/check.sh FILE --only NAME…  some engines: three.js, "Babylon.js", "Babylon.js, glTF", Mitsuba, Blender, cmgen
+#   scripts/engines/check.sh FILE --only NAME…  some engines: three.js, "Babylon.js", "Babylon.js, glTF", Mitsuba, Blender, wgpu, cmgen
 #   scripts/engines/check.sh FILE --picture engines.png [--panorama sky.exr]    one scene in all of them
 #   scripts/engines/check.sh FILE --details     what each wrong folder was noticed by, all levels of cmgen
 # Python and Node packages of fixed versions go into target/engines; Chromium and cmgen are the system's (Debian: chromium
