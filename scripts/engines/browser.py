@@ -47,8 +47,11 @@ def run(asked, modules, page, values):
         capture_output=True, text=True, timeout=300, env={**os.environ, "HOME": str(place)})
     server.shutdown()
     found = re.search(r'<pre id="out">(.*?)</pre>', done.stdout, re.S)
-    if not found or not found[1].startswith("{"):
-        raise RuntimeError((found[1] if found else done.stdout[:500]) + done.stderr[-2000:])
+    if not found:
+        # not even the page as it was given: a container without what it needs, say
+        raise job.Missing(f"Chromium shows no page: {(done.stderr.strip() or 'no reason given')[-300:]}")
+    if not found[1].startswith("{"):
+        raise RuntimeError(found[1] + done.stderr[-2000:])
     return json.loads(found[1])
 
 
