@@ -5,7 +5,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/setup.sh
 # gpu: the golden fields are computed by the GPU decoder too. ndarray: the golden numbers run on both CPU devices.
+# ndarray is compiled for that alone: optimised less, it takes minutes less.
 test=(cargo test --release --workspace --features "veni/gpu,veni/ndarray,veni-cli/ndarray")
+test+=(--config profile.release.package.burn-ndarray.opt-level=1)
 if (($#)); then
     exec "${test[@]}" "$@"
 fi

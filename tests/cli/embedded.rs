@@ -64,3 +64,28 @@ fn a_truncated_photograph_is_refused() {
     );
     dir.refused(&["fit", &file("trunc.jpg")], &["trunc.jpg", "truncated JPEG file"]);
 }
+
+#[test]
+fn light_and_ibl_agree_on_the_sun() {
+    let dir = Dir::new();
+    let folder = crate::util::panoramas();
+    let panoramas =
+        ["train/snowy_field", "train/venice_sunset", "train/qwantani_night", "val/kloppenheim_06"];
+    let panoramas = panoramas.map(|name| text(&folder.join(format!("{name}.exr"))));
+    let seeds = ["3", "6", "19", "21"];
+    let mut skies: Vec<(Vec<&str>, Vec<&str>)> =
+        panoramas.iter().map(|p| (vec![p.as_str()], vec![])).collect();
+    skies.extend(seeds.map(|s| (vec!["--seed", s], vec!["--sky-size", "512"])));
+    let (mut with, mut without) = (0, 0);
+    for (at, (sky, grid)) in skies.iter().enumerate() {
+        let light = one(&dir, &[&["light"], &sky[..]].concat());
+        let folder = format!("sky{at}");
+        let to = ["--engine", "blender", "--size", "16", "-o", &folder];
+        let ibl = one(&dir, &[&["ibl"], &sky[..], &grid[..], &to].concat());
+        for key in ["direction", "irradiance", "radius_source"] {
+            assert_eq!(light["sun"][key], ibl["sun"][key], "{sky:?}: {key}");
+        }
+        *if ibl["sun"].is_null() { &mut without } else { &mut with } += 1;
+    }
+    assert!(with >= 3 && without >= 2, "{with} with a sun, {without} without");
+}

@@ -50,6 +50,15 @@ fn radiance_headers_are_obeyed() {
     let facts = one(&dir, &["inspect", "zero.hdr"]);
     let notes = facts["notes"].as_array().unwrap();
     assert!(notes.len() == 1 && notes[0].as_str().unwrap().contains("EXPOSURE=0"), "{facts}");
+    // what is said once is in the report, and is still there when nothing is examined again
+    for _ in 0..2 {
+        dir.ok(&["prepare", "zero.hdr", "-o", "said", "--size", "64x32", "--val", "0"]);
+        let reported: Value =
+            serde_json::from_slice(&std::fs::read(dir.path("said/report.json")).unwrap()).unwrap();
+        assert_eq!(reported["files"][0]["notes"], facts["notes"]);
+        let page = std::fs::read_to_string(dir.path("said/report.md")).unwrap();
+        assert!(page.contains("## Worth knowing") && page.contains("zero.exr: EXPOSURE=0"), "{page}");
+    }
     // Display P3 to linear Rec. 709 (CSS Color 4, 10.1)
     dir.write("wide.hdr", hdr("PRIMARIES=0.68 0.32 0.265 0.69 0.15 0.06 0.3127 0.329\n", "\n"));
     let [r, g, b] = means(&prepared(&dir, "ref.hdr", "64x32", &[]).0.unwrap());
@@ -177,6 +186,7 @@ fn gain_maps_make_high_dynamic_range_or_are_named() {
     }
 }
 
+#[cfg(feature = "avif")]
 #[test]
 fn reserved_code_points_are_one_error() {
     let dir = Dir::new();

@@ -83,6 +83,65 @@ fn layers_are_chosen_by_name_and_vectors_are_none() {
     dir.refused(&["encode", "vectors.exr", "-q"], &["vectors.exr", "N.X, N.Y, N.Z", "vectors"]);
 }
 
+#[cfg(feature = "learn")]
+#[test]
+fn training_and_evaluation_take_a_layer() {
+    let dir = Dir::new();
+    for (folder, factors) in [("two", [1.0, 3.0]), ("plain", [3.0, 0.0])] {
+        for (side, count) in [("train", 2), ("val", 1)] {
+            let to = dir.path(folder).join(side);
+            std::fs::create_dir_all(&to).unwrap();
+            for at in 0..count {
+                let part = |name, factor: f32| layer(name, rgb("", factor * (1.0 + at as f32)), |_| ());
+                let parts = if folder == "two" {
+                    vec![part("left", factors[0]), part("right", factors[1])]
+                } else {
+                    vec![part("", factors[0])]
+                };
+                exr(&to.join(format!("{at}.exr")), parts, (WIDTH, HEIGHT));
+            }
+        }
+    }
+    let train =
+        |data, out, more: &[&str]| dir.run(&[&crate::util::train_args(data, out, "2")[..], more].concat());
+    let refused = train("two", "none", &[]);
+    assert!(refused.code == Some(2) && refused.err.contains("\"left\", \"right\""), "{refused:?}");
+    let weights = |data, out, more: &[&str]| {
+        let run = train(data, out, more);
+        assert_eq!(run.code, Some(0), "{run:?}");
+        // the file itself also holds the command
+        let hash = one(&dir, &["inspect", &format!("{out}/model.safetensors")])["hash"].clone();
+        assert!(hash.is_string());
+        hash
+    };
+    // a run of the right layer is that of panoramas which have nothing else
+    let right = weights("two", "right", &["--layer", "right"]);
+    assert!(right == weights("plain", "alone", &[]) && right != weights("two", "left", &["--layer", "left"]));
+    let evaluate = [
+        "evaluate",
+        "reconstruction",
+        "--model",
+        crate::util::model(),
+        "--quick",
+        "--images",
+        "1",
+        "--size",
+        "64",
+    ];
+    let scores = |data: &str, out: &str, more: &[&str]| {
+        let [value] = &dir.json(&[&evaluate[..], &["--data", data, "--out", out], more].concat())[..] else {
+            panic!("one object")
+        };
+        value["rows"].clone()
+    };
+    let found = scores("two", "a", &["--layer", "right"]);
+    assert!(!found.is_null() && found == scores("plain", "b", &[]), "{found}");
+    dir.refused(
+        &[&evaluate[..], &["--data", "two", "--out", "c"]].concat(),
+        &["\"left\", \"right\"", "--layer NAME"],
+    );
+}
+
 #[test]
 fn what_is_transparent_or_not_stored_is_unknown() {
     let dir = Dir::new();
@@ -141,5 +200,3 @@ fn a_damaged_palette_costs_its_own_file_only() {
     assert_eq!(run.code, Some(1), "{run:?}");
     assert!(run.err.contains("palette of 4 bytes") && dir.path("data/train/ref.exr").is_file(), "{run:?}");
 }
-
-#[cfg(feature = "avif")]

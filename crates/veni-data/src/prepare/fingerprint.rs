@@ -190,3 +190,59 @@ impl Unpacked {
 fn sum(row: &[f32]) -> f64 {
     row.iter().map(|v| f64::from(*v)).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of [mean, cosine and sine of orders 1 to 12], as they are stored.
+    fn rows(panorama: &Panorama) -> Vec<Vec<f64>> {
+        let values = Fingerprint::new(panorama).0;
+        values.chunks(2 * ORDERS + 1).map(|row| row.iter().map(|v| f64::from(*v)).collect()).collect()
+    }
+
+    /// Three bright sides are waves of order 3 and its multiples alone, and a turn is a phase.
+    #[test]
+    fn a_wave_is_seen_at_its_order_and_turns_by_its_phase() {
+        let wave = |turn: f32| {
+            let log = |[x, y, _]: [f32; 3]| 0.8 * (3.0 * (y.atan2(x) - turn)).cos();
+            Panorama::from_fn(Equirect::new(256, 128), |d| [log(d).exp(); 3])
+        };
+        let still = rows(&wave(0.0));
+        assert_eq!(still.len(), GRID.height);
+        let squares = |orders: &dyn Fn(usize) -> bool| -> f64 {
+            let of_row = |row: &Vec<f64>| -> f64 {
+                row.iter().enumerate().filter(|(k, _)| orders(k.div_ceil(2))).map(|(_, v)| v * v).sum()
+            };
+            still.iter().map(of_row).sum()
+        };
+        let total = squares(&|_| true);
+        assert!((total.sqrt() / f64::from(UNIT) - 1.0).abs() < 1e-3, "{}", total.sqrt());
+        assert!(squares(&|order| order == 3) > 0.9 * total);
+        assert!(squares(&|order| order % 3 != 0) < 1e-6 * total);
+        let phase = |rows: &[Vec<f64>]| {
+            let (cosine, sine) = rows.iter().fold((0.0, 0.0), |(c, s), row| (c + row[5], s + row[6]));
+            sine.atan2(cosine)
+        };
+        for turn in [0.1f32, -0.3, 0.9] {
+            // columns run against the azimuth
+            let off = phase(&rows(&wave(turn))) - phase(&still) + 3.0 * f64::from(turn);
+            let off = (off + PI).rem_euclid(2.0 * PI) - PI;
+            assert!(off.abs() < 0.02, "{turn}: off by {off}");
+        }
+    }
+
+    /// Prepared folders keep fingerprints: later versions must compute the same.
+    #[test]
+    fn a_fingerprint_is_what_it_was() {
+        let sky = Panorama::from_fn(Equirect::new(256, 128), |[x, y, z]| {
+            [1.5 + x, 2.0 + 0.5 * y * z, 1.0 + z.max(0.0)]
+        });
+        let rows = rows(&sky);
+        let found: Vec<Vec<i32>> =
+            [0, 5, 11].iter().map(|at: &usize| rows[*at][..5].iter().map(|v| *v as i32).collect()).collect();
+        let expected = [[0; 5], [0; 5], [0; 5]];
+        let close = found.iter().flatten().zip(expected.iter().flatten()).all(|(a, b)| (a - b).abs() <= 1);
+        assert!(close, "{found:?}");
+    }
+}

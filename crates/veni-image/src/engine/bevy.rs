@@ -43,6 +43,8 @@ pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer)
             "use bevy::{{camera::Hdr, light::Skybox, prelude::*}};\n\n\
              /// Lights the scene: give it the camera. The files are in assets/sky.\n\
              pub fn sky(commands: &mut Commands, assets: &AssetServer, camera: Entity) {{\n    \
+             // Bevy's own 80 cd/m2 from everywhere would come on top\n    \
+             commands.insert_resource(GlobalAmbientLight::NONE);\n    \
              commands.entity(camera).insert((\n        Hdr,\n        \
              EnvironmentMapLight {{ diffuse_map: assets.load(\"sky/diffuse.ktx2\"), specular_map: assets.load(\"sky/specular.ktx2\"), intensity: {k}, ..default() }},\n        \
              Skybox {{ image: Some(assets.load(\"sky/skybox.ktx2\")), brightness: {k}, ..default() }},\n    ));\n{light}}}\n"
@@ -57,7 +59,8 @@ pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer)
              diffuse.ktx2   irradiance / pi{without}\n\
              skybox.ktx2    what the camera sees\n\n\
              y is up; the centre of the panorama is at -z, where a camera without rotation looks.\n\
-             One unit of radiance in the files is {k} cd/m2; sun and sky share that constant.\n",
+             One unit of radiance in the files is {k} cd/m2; sun and sky share that constant. sky.rs takes Bevy's own ambient\n\
+             light (80 cd/m2 by default) away.\n",
             without = if sun.is_some() { ", without the sun" } else { "" }
         ),
     )?;

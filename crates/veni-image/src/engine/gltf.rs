@@ -80,7 +80,8 @@ pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer)
         "README.txt",
         format!(
             "A sky as glTF, for Babylon.js' loader (EXT_lights_image_based; other programs ignore it and keep the sun).\n\n    \
-             await BABYLON.AppendSceneAsync('gltf/sky.glb', scene);\n    scene.environmentTexture.level = {};\n\n\
+             await BABYLON.AppendSceneAsync('gltf/sky.glb', scene);\n    scene.environmentTexture.level = {};\n    \
+             scene.environmentTexture.gammaSpace = false;  // the loader leaves it on, and reflections are decoded twice\n\n\
              sky.glb  GGX levels (8-bit RGBD) and irradiance harmonics{}\n\n\
              Radiance in the file is that of the panorama times {factor}; the level makes up for it.\n",
             1.0 / factor,

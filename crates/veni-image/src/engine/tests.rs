@@ -114,22 +114,38 @@ fn looks_up(
 #[test]
 fn bevy_sees_what_is_there() {
     folder(Engine::Bevy, true, |folder| {
-        let bytes = std::fs::read(folder.join("specular.ktx2")).unwrap();
-        let reader = ktx2::Reader::new(&bytes[..]).unwrap();
-        assert_eq!((reader.header().level_count, reader.header().pixel_width), (3, 32));
-        let level = reader.levels().next().unwrap().data.to_vec();
         // centre at −z, left at −x, right at +x, seam at +z, and z negated before the lookup
         let v = [[0., 0., 1.], [-1., 0., 0.], [0., 1., 0.]];
-        looks_up("bevy", v, 32, |face, row, column| {
-            let at = 4 * ((face * 32 + row) * 32 + column);
-            crate::texture::decode_e5b9g9r9(u32::from_le_bytes(level[at..at + 4].try_into().unwrap()))
-        });
+        for (file, levels, size, contrast) in
+            [("specular.ktx2", 3, 32, 1.0), ("diffuse.ktx2", 1, 32, 2.0 / 3.0), ("skybox.ktx2", 1, 64, 1.0)]
+        {
+            // what Bevy's loader asks of a file: no supercompression, six faces, a format that it knows
+            let bytes = std::fs::read(folder.join(file)).unwrap();
+            let reader = ktx2::Reader::new(&bytes[..]).unwrap();
+            let header = reader.header();
+            assert_eq!((header.level_count, header.pixel_width, header.pixel_height), (levels, size, size));
+            assert_eq!((header.face_count, header.layer_count, header.pixel_depth), (6, 0, 0), "{file}");
+            assert_eq!(header.supercompression_scheme, None, "{file}");
+            assert_eq!(header.format, Some(ktx2::Format::E5B9G9R9_UFLOAT_PACK32), "{file}");
+            for (k, level) in reader.levels().enumerate() {
+                assert_eq!(level.data.len(), 4 * 6 * (size as usize >> k).pow(2), "{file}, level {k}");
+            }
+            let level = reader.levels().next().unwrap().data.to_vec();
+            let size = size as usize;
+            looks_up(file, v, size, |face, row, column| {
+                let at = 4 * ((face * size + row) * size + column);
+                let texel = level[at..at + 4].try_into().unwrap();
+                // light of a single band is diffused by the factor of that band
+                crate::texture::decode_e5b9g9r9(u32::from_le_bytes(texel)).map(|c| 2.0 + (c - 2.0) / contrast)
+            });
+        }
         let code = text(folder, "sky.rs");
         // s = (0.48, 0.64, 0.6) native is (−0.64, 0.6, −0.48) in Bevy; light looks along −s
         assert!(close(numbers(&code, "looking_to(Vec3::new("), [0.64, -0.6, 0.48]), "{code}");
         let y = crate::luminance([6.0, 5.0, 4.0]);
         assert!((numbers(&code, "illuminance: ")[0] - 1000.0 * y).abs() < 0.1);
         assert!(close(numbers(&code, "linear_rgb("), [6.0 / y, 5.0 / y, 4.0 / y]));
+        assert!(code.contains("insert_resource(GlobalAmbientLight::NONE)"), "{code}");
     });
 }
 
@@ -195,7 +211,8 @@ fn babylon_sees_what_is_there() {
         // left-handed: centre at +z, left at −x, right at +x, seam at −z
         let v = [[0., 0., 1.], [-1., 0., 0.], [0., 1., 0.]];
         looks_up("babylon", v, 32, |face, row, column| {
-            from_rgbd(faces[face].get_pixel(column as u32, row as u32).0)
+            // the first row of an image is the bottom of a face
+            from_rgbd(faces[face].get_pixel(column as u32, 31 - row as u32).0)
         });
         let code = text(folder, "sky.js");
         // native (x, y, z) is (−y, z, x)
@@ -288,7 +305,9 @@ fn a_glb_holds_every_face_and_the_sun() {
             let view = &json["bufferViews"][face];
             let at = view["byteOffset"].as_u64().unwrap() as usize;
             let png = &data[at..at + view["byteLength"].as_u64().unwrap() as usize];
-            from_rgbd(image::load_from_memory(png).unwrap().to_rgba8().get_pixel(column as u32, row as u32).0)
+            let face = image::load_from_memory(png).unwrap().to_rgba8();
+            // the first row of an image is the bottom of a face
+            from_rgbd(face.get_pixel(column as u32, 31 - row as u32).0)
         });
         let z: Vec<f64> = (8..11).map(|k| json["nodes"][0]["matrix"][k].as_f64().unwrap()).collect();
         assert!(z.iter().zip([0.48, 0.6, -0.64]).all(|(a, b)| (a - b).abs() < 1e-4), "{z:?}");

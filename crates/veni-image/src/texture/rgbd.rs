@@ -20,7 +20,8 @@ pub fn from_rgbd([r, g, b, d]: [u8; 4]) -> [f32; 3] {
     [r, g, b].map(|v| (f32::from(v) / 255.0).powf(2.2) / (f32::from(d) / 255.0))
 }
 
-/// A square of texels as a PNG file.
+/// A face of a cube as a PNG file, its last row first: Babylon.js uploads the images of faces upside down (`invertY`), so that the first
+/// row of an image becomes the bottom of the face.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a value that is negative, not finite, or beyond 255.
@@ -38,7 +39,7 @@ pub fn rgbd_png(size: usize, texels: &[[f32; 3]]) -> Result<Vec<u8>> {
     encoder.set_color(png::ColorType::Rgba);
     encoder.set_depth(png::BitDepth::Eight);
     let mut writer = encoder.write_header().map_err(wrong)?;
-    let bytes: Vec<[u8; 4]> = texels.iter().map(|t| rgbd(*t)).collect();
+    let bytes: Vec<[u8; 4]> = texels.chunks_exact(size).rev().flatten().map(|t| rgbd(*t)).collect();
     writer.write_image_data(bytes.as_flattened()).map_err(wrong)?;
     writer.finish().map_err(wrong)?;
     Ok(file)

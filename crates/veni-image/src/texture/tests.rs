@@ -107,7 +107,8 @@ fn an_env_file_holds_six_images_per_level() {
     assert_eq!(value["irradiance"]["xy"], serde_json::json!([8.5, 1, -0.25]));
     for (k, image) in header.specular.mipmaps.iter().enumerate() {
         let bytes = &file[json + 1 + image.position as usize..][..image.length as usize];
-        let decoded = image::load_from_memory(bytes).unwrap().to_rgba8();
+        // upside down, as Babylon.js uploads it
+        let decoded = image::load_from_memory(bytes).unwrap().flipv().to_rgba8();
         let level = &levels[k / 6];
         assert_eq!(decoded.width() as usize, level.size());
         let area = level.size() * level.size();

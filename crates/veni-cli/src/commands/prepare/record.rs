@@ -45,6 +45,9 @@ pub(super) struct Facts {
     pub(super) replaced: Replaced,
     pub(super) expanded: Option<Expansion>,
     pub(super) fingerprint: Fingerprint,
+    /// What was said of the file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) notes: Vec<String>,
 }
 
 /// Values that were painted over.
@@ -130,6 +133,7 @@ impl Facts {
             replaced: Replaced { nan, infinite, not_positive },
             expanded: examined.expanded.map(expansion),
             fingerprint: examined.fingerprint.clone(),
+            notes: examined.notes.clone(),
         }
     }
 }

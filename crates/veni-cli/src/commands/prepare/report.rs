@@ -118,6 +118,7 @@ fn kept(kept: &Kept) -> Value {
         "log_exposure": facts.log_exposure,
         "replaced": facts.replaced,
         "expanded": facts.expanded,
+        "notes": facts.notes,
     })
 }
 
@@ -200,6 +201,14 @@ fn markdown(
         placed.kept.iter().filter_map(|k| expanded(&k.record, &k.file)),
     )?;
     section(&mut out, "Values replaced", placed.kept.iter().filter_map(|k| replaced(&k.record, &k.file)))?;
+    section(
+        &mut out,
+        "Worth knowing",
+        placed.kept.iter().flat_map(|k| {
+            let notes = k.record.facts().map_or(&[][..], |f| &f.notes);
+            notes.iter().map(|note| format!("{}: {note}", k.file))
+        }),
+    )?;
     section(&mut out, "No images", ignored.iter().cloned())?;
     Ok(out)
 }

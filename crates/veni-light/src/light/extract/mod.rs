@@ -167,30 +167,30 @@ impl Extraction {
                 best = Some((y, cell.direction));
             }
         });
-        self.settled(best?.1).filter(|m| angle(m.centre, direction) <= radius + m.scale)
+        self.settled(best?.1, 0.0).filter(|m| angle(m.centre, direction) <= radius + m.scale)
     }
 
     /// The candidate of the greatest excess.
     fn strongest(&self, seeds: &[[f64; 3]], criteria: Criteria) -> Option<Measured> {
-        let measured = tasks::map(seeds.iter(), || (), |(), seed| self.settled(*seed));
-        let allowed = measured.into_iter().flatten().filter(|m| {
-            m.contrast() >= criteria.contrast && m.excess >= criteria.share * self.facing(m.centre)
-        });
+        let measured = tasks::map(seeds.iter(), || (), |(), seed| self.settled(*seed, criteria.contrast));
+        let allowed =
+            measured.into_iter().flatten().filter(|m| m.excess >= criteria.share * self.facing(m.centre));
         allowed.reduce(|a, b| if b.excess > a.excess { b } else { a })
     }
 
     /// A candidate at the scale that holds it, seen from its own middle: a seed may be so far from it that only a wide cap
     /// reaches it.
-    fn settled(&self, seed: [f64; 3]) -> Option<Measured> {
-        let mut best = self.scaled(seed)?;
-        while let Some(closer) = self.scaled(best.centre).filter(|closer| closer.scale < best.scale) {
+    fn settled(&self, seed: [f64; 3], contrast: f64) -> Option<Measured> {
+        let mut best = self.scaled(seed, contrast)?;
+        while let Some(closer) = self.scaled(best.centre, contrast).filter(|closer| closer.scale < best.scale)
+        {
             best = closer;
         }
         Some(best)
     }
 
-    /// A candidate at the scale that holds it: where the excess has stopped growing, the one that stands out most.
-    fn scaled(&self, seed: [f64; 3]) -> Option<Measured> {
+    /// A candidate of this contrast at the scale that holds it: where the excess has stopped growing, the one that stands out most.
+    fn scaled(&self, seed: [f64; 3], contrast: f64) -> Option<Measured> {
         let pixel = self.levels[0].cell_angle();
         let mut scales: Vec<f64> =
             SCALES.iter().map(|s| s.to_radians()).filter(|s| *s > 1.3 * PIXELS * pixel).collect();
@@ -205,18 +205,22 @@ impl Extraction {
         };
         let stands_out =
             |m: &Measured| m.excess / (m.scale * m.scale * m.background_luminance().max(f64::MIN_POSITIVE));
+        // the top of a wide light may be too flat to be one by itself
+        let enough = |m: &Measured| m.contrast() >= contrast;
         let stopped = (0..all.len()).filter(|at| growth(*at).is_some_and(|g| g < GROWTH));
-        let stopped = stopped.filter_map(|at| Some((all[at]?, all[at + 1])));
+        let stopped = stopped.filter_map(|at| Some((all[at]?, all[at + 1]))).filter(|(m, _)| enough(m));
         let stopped = stopped.reduce(|a, b| if stands_out(&b.0) > stands_out(&a.0) { b } else { a });
         // the rim of a disc that fills the cap lies partly outside
         let stopped =
             stopped.and_then(|(m, wider)| if m.filled() > FULL * m.scale { wider } else { Some(m) });
-        stopped.or_else(|| {
-            let growing = (0..all.len()).filter_map(|at| Some((growth(at)?, at)));
-            let slowest = growing.reduce(|a, b| if b.0 < a.0 { b } else { a });
+        let widest = || all.iter().flatten().next_back().copied();
+        let found = stopped.or_else(|| {
             // it ends somewhere in the wider of the two
-            slowest.and_then(|s| all[s.1 + 1]).or_else(|| all.iter().flatten().next_back().copied())
-        })
+            let growing = (0..all.len()).filter_map(|at| Some((growth(at)?, all[at + 1]?)));
+            let slowest = growing.filter(|(_, m)| enough(m)).reduce(|a, b| if b.0 < a.0 { b } else { a });
+            slowest.map(|s| s.1).or_else(widest)
+        });
+        found.filter(enough)
     }
 
     /// Replaces what exceeds the background by the background.
