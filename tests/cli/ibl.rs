@@ -26,7 +26,9 @@ const FOLDERS: [(&str, &[&str]); 11] = [
             "README.txt",
             "dfg.exr",
             "diffuse.exr",
+            "light.bin",
             "light.json",
+            "light.wgsl",
             "sky.exr",
             "specular_0.exr",
             "specular_1.exr",
@@ -98,6 +100,7 @@ fn every_engine_gets_its_folder() {
         assert!(direct > 0.2 * whole[c]);
         assert!(((rest + direct) / whole[c] - 1.0).abs() < 5e-3, "{rest} + {direct} for {}", whole[c]);
     }
+    samples_hold_the_sky(&dir, whole);
     // an existing folder is left alone, and replaced by the same bytes if asked
     let refused = dir.run(&args);
     assert_eq!(refused.code, Some(2), "{}", refused.err);
@@ -106,6 +109,41 @@ fn every_engine_gets_its_folder() {
     let before = read();
     dir.ok(&[&args[..], &["--force"]].concat());
     assert_eq!(before, read());
+}
+
+/// What shaders sample for any renderer: densities of one in all, and with the sun the energy of the panorama.
+fn samples_hold_the_sky(dir: &Dir, up: [f64; 3]) {
+    let read = |name: &str| std::fs::read(dir.path("out/any").join(name)).unwrap();
+    let told: Value = serde_json::from_slice(&read("light.json")).unwrap();
+    let bytes = read("light.bin");
+    let buffer = |name: &str| -> Vec<f32> {
+        let [at, length] = [0, 1].map(|k| told["buffers"][name][k].as_u64().unwrap() as usize);
+        assert!(at % 256 == 0 && at + length <= bytes.len());
+        bytes[at..at + length].as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+    };
+    let (uniform, texels) = (buffer("veni_light"), buffer("veni_light_texels"));
+    let cells = buffer("veni_light_cells").len() / 2;
+    assert_eq!((uniform[0], uniform[1], cells), (0.0, 1.0, (256usize * 128).next_power_of_two()));
+    let grid = Equirect::new(256, 128);
+    let (mut density, mut sum) = (0.0, [0.0; 3]);
+    for (k, d) in grid.directions().iter().enumerate() {
+        let w = grid.solid_angle(k / grid.width);
+        density += w * f64::from(texels[4 * k + 3]);
+        sum = [0, 1, 2].map(|c| sum[c] + w * f64::from(texels[4 * k + c] * d[2].max(0.0)));
+    }
+    assert!((density - 1.0).abs() < 1e-4, "{density}");
+    // the first compact light: direction, radius, irradiance
+    let sun = &uniform[16..];
+    for (c, whole) in up.into_iter().enumerate() {
+        let found = sum[c] + f64::from(sun[4 + c] * sun[2]);
+        assert!((found / whole - 1.0).abs() < 5e-3, "{found} for {whole}");
+    }
+    let text = String::from_utf8(read("light.wgsl")).unwrap();
+    assert!(
+        ["fn veni_sample_light", "fn veni_light_pdf", "var<storage, read> veni_light_cells"]
+            .iter()
+            .all(|t| text.contains(t))
+    );
 }
 
 #[test]

@@ -9,9 +9,10 @@ use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{ArgGroup, Args, ValueEnum};
 use serde_json::json;
+use veni_gpu::shader::{self, LightDensity};
 use veni_image::Panorama;
-use veni_image::engine::{self, Engine, Sky};
-use veni_light::light::{CompactLight, Levels, LightOptions, Prefilter, Sh};
+use veni_image::engine::{self, Engine, Sampling, Sky};
+use veni_light::light::{CompactLight, Levels, Light, LightOptions, Prefilter, Sh};
 use veni_light::output::Overwrite;
 use veni_light::progress::Observer;
 use veni_light::sphere::Equirect;
@@ -27,6 +28,9 @@ use unit::Unit;
 
 /// Where a latent is decoded if nothing else is asked for: decoded skies hold nothing finer than some degrees.
 const DECODED: Equirect = Equirect { width: 2048, height: 1024 };
+
+/// Samples for shaders are of a map of this size at most: the sun, which is the finest part, is apart.
+const SAMPLED: Equirect = Equirect { width: 1024, height: 512 };
 
 /// Make a sky ready for an engine: maps, sun, and the lines that load them
 #[derive(Args, Debug)]
@@ -186,6 +190,7 @@ impl Ibl {
             sun: split.sun,
             size: self.size,
             exposure,
+            sampling: folders.iter().any(|f| f.0 == Engine::Any).then(|| split.sampling()).transpose()?,
         };
         let bars = Bars::new(report);
         let images: usize = folders.iter().map(|(engine, _)| engine.images(self.size)).sum();
@@ -278,6 +283,22 @@ impl Ibl {
 }
 
 impl Split {
+    /// Samples of it in a shader.
+    fn sampling(&self) -> Result<Sampling> {
+        let map = self.map.grid();
+        let small = (map.width > SAMPLED.width).then(|| self.map.resample(SAMPLED));
+        let light = Light::of_parts(small.as_ref().unwrap_or(&self.map).environment()?, self.sun);
+        let packed = shader::pack_light(&light, LightDensity::Luminance)?;
+        Ok(Sampling {
+            wgsl: format!("{}\n{}", shader::light_bindings(0, 0), shader::light()),
+            buffers: vec![
+                ("veni_light", packed.uniform.to_bytes().to_vec()),
+                ("veni_light_cells", packed.cells.iter().flatten().flat_map(|v| v.to_le_bytes()).collect()),
+                ("veni_light_texels", packed.texels.iter().flatten().flat_map(|v| v.to_le_bytes()).collect()),
+            ],
+        })
+    }
+
     fn scale(&mut self, factor: f32) {
         if factor == 1.0 {
             return;

@@ -7,7 +7,7 @@ use veni_light::sphere::Equirect;
 
 use super::bevy::DIFFUSE;
 use super::light::triple;
-use super::{Engine, Folder, Sky};
+use super::{Engine, Folder, Sampling, Sky};
 use crate::{Panorama, Result};
 
 /// Entries along a side of the table of the split sum.
@@ -35,28 +35,53 @@ pub(super) fn write(sky: &Sky<'_>, folder: &mut Folder, observer: &dyn Observer)
             sun.radius.to_degrees()
         )
     });
+    let sampling = match &sky.sampling {
+        Some(sampling) => sampling_files(sampling, folder)?,
+        None => String::new(),
+    };
     let sh: Vec<String> = (sky.sh.coefficients().iter()).map(|[r, g, b]| format!("[{r},{g},{b}]")).collect();
     folder.add(
         "light.json",
         format!(
-            "{{\"sun\":{sun},\"sh\":[{}],\"roughness\":[{}],\"exposure\":{}}}\n",
+            "{{\"sun\":{sun},\"sh\":[{}],\"roughness\":[{}],\"exposure\":{}{sampling}}}\n",
             sh.join(","),
             roughness.join(","),
             sky.exposure
         ),
     )?;
+    let sampler = if sky.sampling.is_some() { SAMPLER } else { "" };
     folder.add(
         "README.txt",
-        "A sky for any renderer.\n\n\
+        format!("A sky for any renderer.\n\n\
          sky.exr         the panorama of what follows: without the sun if light.json has one\n\
          specular_N.exr  GGX levels as cubes, faces stacked +X -X +Y -Y +Z -Z; perceptual roughness N in light.json\n\
          diffuse.exr     irradiance / pi, a cube\n\
          dfg.exr         split-sum table: reflectance = mix(R, G, f0); columns n.v, rows perceptual roughness from the top\n\
          light.json      sun (direction, irradiance at normal incidence, radius in degrees), nine harmonics of radiance\n                \
-         (orthonormal, with the sign (-1)^m, order 00, 1-1, 10, 11, 2-2, ...), roughness of the levels, cd/m2 per unit\n\n\
+         (orthonormal, with the sign (-1)^m, order 00, 1-1, 10, 11, 2-2, ...), roughness of the levels, cd/m2 per unit\n\
+         {sampler}\n\
          Directions are native: z up, the centre of the panorama at +x, its left quarter at +y.\n\
-         Cubes: y up, lookup vector (x, z, -y) of a native direction.\n",
+         Cubes: y up, lookup vector (x, z, -y) of a native direction.\n"),
     )
+}
+
+/// What README.txt says of the files for shaders.
+const SAMPLER: &str = "light.wgsl      for path tracers: veni_sample_light, veni_light_pdf, veni_light_radiance, veni_sun, veni_irradiance\n\
+    light.bin       the buffers that it declares, one after the other; where each begins, and its bytes, in light.json.\n                \
+    The first eight bytes, sine and cosine of an angle, rotate the light about z\n";
+
+/// The files for shaders; what light.json says of them.
+fn sampling_files(sampling: &Sampling, folder: &mut Folder) -> Result<String> {
+    folder.add("light.wgsl", &sampling.wgsl)?;
+    let (mut bytes, mut places) = (Vec::new(), Vec::new());
+    for (name, buffer) in &sampling.buffers {
+        // as far apart as WebGPU's default wants of offsets
+        bytes.resize(usize::next_multiple_of(bytes.len(), 256), 0);
+        places.push(format!("\"{name}\":[{},{}]", bytes.len(), buffer.len()));
+        bytes.extend_from_slice(buffer);
+    }
+    folder.add("light.bin", &bytes)?;
+    Ok(format!(",\"buffers\":{{{}}}", places.join(",")))
 }
 
 /// The faces of a cube in one image, from top to bottom.

@@ -145,6 +145,17 @@ pub struct Sky<'a> {
     pub size: usize,
     /// Luminance of one unit of radiance, cd/m².
     pub exposure: f64,
+    /// What samples the light in a shader, for [`Engine::Any`].
+    pub sampling: Option<Sampling>,
+}
+
+/// Functions of a shader that sample a light, and what they read.
+#[derive(Clone, Debug)]
+pub struct Sampling {
+    /// Their text.
+    pub wgsl: String,
+    /// Each buffer by its name in the text, little endian.
+    pub buffers: Vec<(&'static str, Vec<u8>)>,
 }
 
 /// Writes the folder for an engine, with everything in it or not at all, and gives the files. `observer` is told of every image.

@@ -46,6 +46,7 @@ fn folder(engine: Engine, split: bool, check: impl FnOnce(&Path)) {
         sun: split.then(sun),
         size,
         exposure: 1000.0,
+        sampling: None,
     };
     let place = tempfile::tempdir().unwrap();
     let target = place.path().join(engine.name());

@@ -153,6 +153,15 @@ impl Light {
         LightOptions::default().of_pixels(grid, field.bake(grid))
     }
 
+    /// A light that is split already: what is left without a sun, and the sun.
+    pub fn of_parts(residual: EnvironmentMap<'_>, sun: Option<CompactLight>) -> Self {
+        let options = LightOptions { lights: 0, ..LightOptions::default() };
+        let mut light = options.split(residual.grid(), residual.pixels().to_vec());
+        light.has_sun = sun.is_some();
+        light.lights.extend(sun);
+        light
+    }
+
     /// The compact lights, the sun first, then the strongest first.
     pub fn lights(&self) -> &[CompactLight] {
         &self.lights

@@ -151,6 +151,18 @@ fn fewer_lights_are_the_first_of_all_and_the_rest_is_put_back() {
 }
 
 #[test]
+fn parts_are_the_light_that_they_were_parted_from() {
+    let grid = Equirect::new(256, 128);
+    let pixels = scene(grid, &[disc(direction(50.0, 30.0), 1.0, [6.0, 5.0, 4.0])]);
+    let split = light_of(grid, &pixels);
+    let again = Light::of_parts(split.residual(), split.sun().copied());
+    assert_eq!((again.lights(), again.sun()), (split.lights(), split.sun()));
+    assert_eq!(again.irradiance([0.0, 0.6, 0.8]), split.irradiance([0.0, 0.6, 0.8]));
+    assert!(again.sh().coefficients() == split.sh().coefficients() && again.mean() == split.mean());
+    assert!(Light::of_parts(split.residual(), None).sun().is_none());
+}
+
+#[test]
 fn lamps_in_a_dark_sky_are_lights_but_no_sun() {
     let grid = Equirect::new(512, 256);
     let lamps: Vec<_> = [(0.0, 20.0), (80.0, 15.0), (170.0, 10.0), (-90.0, 25.0)]
