@@ -177,6 +177,7 @@ fn gain_maps_make_high_dynamic_range_or_are_named() {
     }
 }
 
+#[cfg(feature = "avif")]
 #[test]
 fn reserved_code_points_are_one_error() {
     let dir = Dir::new();

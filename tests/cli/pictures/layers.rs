@@ -141,5 +141,3 @@ fn a_damaged_palette_costs_its_own_file_only() {
     assert_eq!(run.code, Some(1), "{run:?}");
     assert!(run.err.contains("palette of 4 bytes") && dir.path("data/train/ref.exr").is_file(), "{run:?}");
 }
-
-#[cfg(feature = "avif")]
