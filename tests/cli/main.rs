@@ -21,6 +21,8 @@ mod evaluate;
 mod expand_with;
 #[cfg(feature = "learn")]
 mod fit;
+#[cfg(feature = "pretrained")]
+mod fit_light;
 #[cfg(feature = "learn")]
 mod folds;
 #[cfg(all(feature = "learn", feature = "gpu"))]

@@ -50,7 +50,7 @@ pub(crate) enum Command {
     Sample(commands::sample::Sample),
     Synth(commands::synth::Synth),
     Encode(commands::encode::Encode),
-    Fit(commands::fit::Fit),
+    Fit(Box<commands::fit::Fit>),
     Ibl(commands::ibl::Ibl),
     Prepare(commands::prepare::Prepare),
     RenderProbe(commands::render_probe::RenderProbe),

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`Encoder`] | the VN-ViT in plain f32: from a panorama to the posterior over latents |
 //! | [`fit()`], [`fit_shaded`] | latent optimisation under the folded decoder, of panoramas, parts of them, photographs, lit surfaces |
+//! | [`fit_linear`], [`LinearTarget`] | the same of harmonics, irradiance and illuminance alone; [`targets`] reads them |
 //! | [`Observation`] | from a picture to what can be fitted |
 //! | [`shade`] | what a surface looks like under distant light, and the gradient of that |
 //! | [`loss`], [`schedule`] | settings that training shares |
@@ -23,17 +24,19 @@
 mod adam;
 pub mod encoder;
 mod fit;
+pub mod limits;
 pub mod loss;
 mod observation;
 pub mod schedule;
 pub mod shade;
+pub mod targets;
 
 pub use adam::Adam;
 pub use encoder::{Encoded, Encoder};
 pub use fit::{
-    Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective,
-    PanoramaLoss, Plateau, best_light, best_of, fit, fit_shaded, fit_with, from_each, matching_exposure,
-    random_starts,
+    Achieved, Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient,
+    LinearTarget, Method, Objective, PanoramaLoss, Plateau, Received, best_light, best_linear, best_of, fit,
+    fit_linear, fit_shaded, fit_with, from_each, likely_linear, matching_exposure, random_starts,
 };
 pub use observation::Observation;
 pub use veni_light::{Error, Result};

@@ -1,4 +1,4 @@
-// A level of a prefiltered cube map: harmonics times one number per degree, summed in every direction. LIGHT (18).
+// A level of a prefiltered cube map: harmonics times one number per degree, summed in every direction. LIGHT (20).
 
 struct VeniLevel {
     // Native direction of a lookup vector v: v.x axis_x + v.y axis_y + v.z axis_z

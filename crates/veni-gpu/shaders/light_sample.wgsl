@@ -1,5 +1,5 @@
 // Directions drawn by how much light comes from them, and the density with which they are. Radiance and density are those
-// of the sun and the map together, so that a sample needs no second look. LIGHT (16).
+// of the sun and the map together, so that a sample needs no second look. LIGHT (18).
 
 struct VeniLightSample {
     direction: vec3f,

@@ -1,4 +1,4 @@
-// From radiance on rings of latitude to spherical harmonics: waves along the rings, then sums over them. LIGHT (17).
+// From radiance on rings of latitude to spherical harmonics: waves along the rings, then sums over them. LIGHT (19).
 //
 // c_lm = sum over rings j of w_j Y_l|m|(theta_j, 0) sum over columns i of L_ji (cos m phi_i, or sin |m| phi_i for m < 0):
 // Gauss's quadrature in cos(theta), even in phi.

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use veni_fit::LinearTarget;
 use veni_fit::encoder::Encoder;
+use veni_fit::targets::{read_harmonics, read_surfaces};
 use veni_light::latent::Latent;
 use veni_light::model::{Array, Model, ModelConfig, ModelInfo, StoredType, decoder_schema};
 use veni_light::sphere::Equirect;
@@ -13,6 +15,7 @@ use super::{Target, untouched};
 pub(super) const TARGETS: &[Target] = &[
     Target { name: "model", run: model, seeds: models, repair: untouched },
     Target { name: "latent", run: latent, seeds: latents, repair: untouched },
+    Target { name: "target", run: target, seeds: light_targets, repair: untouched },
 ];
 
 /// Loads, folds a field of it and encodes a panorama, as bake and encode do.
@@ -36,6 +39,18 @@ fn latent(path: &Path) -> bool {
     true
 }
 
+/// What a fit is to reach, in either form, as far as the sums over its light.
+fn target(path: &Path) -> bool {
+    let grid = || LinearTarget::new(Equirect::new(8, 4));
+    let harmonics = read_harmonics(path).and_then(|wanted| grid().harmonics(&wanted));
+    let surfaces = read_surfaces(path).and_then(|wanted| grid().surfaces(&wanted));
+    for target in harmonics.iter().chain(&surfaces) {
+        let achieved = target.achieved(&[0.0; 3 * 32]);
+        assert!(achieved.harmonics.len() + achieved.surfaces.len() > 0);
+    }
+    harmonics.is_ok() || surfaces.is_ok()
+}
+
 fn models() -> Vec<Vec<u8>> {
     let mut config = ModelConfig::decode_only(2);
     (config.decoder.hidden, config.decoder.layers, config.decoder.heads) = (4, 1, 1);
@@ -53,4 +68,13 @@ fn models() -> Vec<Vec<u8>> {
 fn latents() -> Vec<Vec<u8>> {
     let full = br#"{"format":1,"model":"0123456789abcdef","n":2,"vectors":[[0.1,0.2,0.3],[0.4,0.5,0.6]],"exposure":-0.5,"source":"street.hdr"}"#;
     vec![full.to_vec(), br#"{"format":1,"n":1,"vectors":[[1,2,3]],"exposure":0}"#.to_vec()]
+}
+
+fn light_targets() -> Vec<Vec<u8>> {
+    let lists: [&[u8]; 3] = [
+        br#"{"sun":null,"sh":[[1,1,1],[0.1,0.2,0.3],[0,0,-0.5],[1e-3,0,0]],"irradiance":{"up":[1,2,3],"left":[4,5,6]}}"#,
+        br"[[1,2,3]]",
+        br#"[{"normal":[0,0,1],"irradiance":[1,2,3]},{"normal":[1,0,-2],"illuminance":5e3}]"#,
+    ];
+    lists.map(<[u8]>::to_vec).to_vec()
 }

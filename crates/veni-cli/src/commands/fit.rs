@@ -1,7 +1,8 @@
-//! `veni-cli fit`: pictures to latents, by optimisation.
+//! `veni-cli fit`: pictures, and what else is known of a light, to latents, by optimisation.
 
 mod completed;
 mod input;
+mod integrals;
 mod model;
 mod settings;
 mod shaded;
@@ -31,15 +32,16 @@ use crate::size::Size;
 use crate::source;
 
 pub(crate) use input::Input;
+use integrals::Integrals;
 use model::FitModel;
 use settings::{Settings, Start};
 use shaded::Shaded;
 
-/// Find the latent of a panorama, a part of one, a photograph, or the light on a surface
+/// Find the latent of a panorama, a part of one, a photograph, the light on a surface, or harmonics of light
 #[derive(Args, Debug)]
 #[command(
-    long_about = "Find the latent of a panorama, a part of one, a photograph, or the light on a surface, by \
-        optimisation.\n\n\
+    long_about = "Find the latent of a panorama, a part of one, a photograph, the light on a surface, or harmonics of \
+        light, by optimisation.\n\n\
         A panorama is OpenEXR, Radiance, PNG or JPEG, twice as wide as high, z up. Pixels that are not a number, \
         transparent, or black in --mask are unknown, and the latent completes them. With --fov the picture is a \
         photograph taken in the direction of --look. Values that a PNG or JPEG has clipped count as \"at least this \
@@ -47,7 +49,10 @@ use shaded::Shaded;
         disagree the completion is uncertain.\n\n\
         With --normals the picture shows a surface of known shape and material, whole or where --mask is white, and \
         the latent is the light under which its rendering looks like the picture ('veni-cli render-probe' makes such \
-        pictures).",
+        pictures).\n\n\
+        With --target-sh, --target-irradiance or --illuminance no picture is needed: the latent is a light that has these \
+        harmonics, or that shines so on surfaces, and is likely otherwise by the model's prior. Radiance is of the files' \
+        unit, directions of the native frame: z up, the middle of a panorama at +x, its left quarter at +y.",
     after_help = "Without -o and --out-dir the latent itself goes to stdout, one line of JSON per picture.\n\n\
         Examples:\n  \
         veni-cli fit sky.exr -o sky.json\n  \
@@ -55,6 +60,8 @@ use shaded::Shaded;
         veni-cli fit half.exr --mask known.png -o sky.json --completed whole.exr --uncertainty std.png\n  \
         veni-cli fit photo.jpg --fov 65 --look 90,10 -o sky.json --completed whole.exr\n  \
         veni-cli fit ball.exr --normals n.exr --mask m.png --ks 0.2 -o light.json --completed light.exr\n  \
+        veni-cli light sky.exr -o light.json && veni-cli fit --target-sh light.json -o sky.json\n  \
+        veni-cli fit sky.exr --illuminance 20000 -o sky.json      radiance in cd/m², 20,000 lux on the ground\n  \
         veni-cli fit sky.exr --preset display -o sky.json && veni-cli bake sky.json -o again.exr"
 )]
 pub(crate) struct Fit {
@@ -85,6 +92,9 @@ pub(crate) struct Fit {
     shaded: Shaded,
 
     #[command(flatten)]
+    integrals: Integrals,
+
+    #[command(flatten)]
     model: ModelArgs,
 
     #[command(flatten)]
@@ -109,6 +119,9 @@ impl Fit {
         let overwrite = Overwrite::from(self.force);
         let pictures = &self.input.pictures;
         self.check_images(overwrite)?;
+        if pictures.is_empty() {
+            return self.unseen(overwrite, report);
+        }
         let outputs = self.target.of(pictures, overwrite, self.shard)?;
         self.shard.note_idle(pictures.len(), report);
         self.settings.grid(false)?;
@@ -134,6 +147,12 @@ impl Fit {
                 );
             }
         }
+        let is_seen = !self.input.pictures.is_empty() && self.shaded.normals.is_none();
+        if self.completed.is_some() && self.integrals.scales() && is_seen {
+            bail!(
+                "--illuminance gives the latent another unit than the picture's: leave --completed out, and bake the latent"
+            );
+        }
         let named = |path: &Option<PathBuf>, extensions: &[&str]| {
             path.iter().try_for_each(|p| output::check(std::slice::from_ref(p), extensions, overwrite))
         };
@@ -152,7 +171,6 @@ impl Fit {
         config: &FitConfig,
         report: Report,
     ) -> Result<()> {
-        let overwrite = Overwrite::from(self.force);
         let picture = self.input.read(path, report)?;
         let mut fitted = match &self.shaded.normals {
             Some(normals) => self.fit_light(path, normals, &picture, model, config, report)?,
@@ -162,26 +180,55 @@ impl Fit {
                 self.fit(path, observation, model, config, report)?
             }
         };
-        fitted.best.latent.source = Some(source_of(path));
-        fitted.best.latent.model = Some(model.hash());
-        if let Some(output) = output {
-            fitted.best.latent.save(output, overwrite).map_err(with_remedy)?;
+        self.integrals.scale(model, &mut fitted.best)?;
+        let seen = Some(&picture).filter(|_| self.shaded.normals.is_none());
+        self.keep(&mut fitted.best, path, output, seen, model)?;
+        self.print(path, output, &fitted, report)
+    }
+
+    /// The light of which only integrals are known.
+    fn unseen(&self, overwrite: Overwrite, report: Report) -> Result<Outcome> {
+        let name = self.integrals.name();
+        self.shard.refuse("-o", true)?;
+        let outputs = self.target.of(std::slice::from_ref(&name), overwrite, self.shard)?;
+        let output = outputs.first();
+        let model = FitModel::new(source::model(&self.model)?)?;
+        self.check_starts(self.settings.start_unseen().1)?;
+        let mut reached = self.integrals.fit(&self.settings, &model, report)?;
+        self.keep(&mut reached.best, &name, output, None, &model)?;
+        let (line, value) = self.integrals.results(output.map(PathBuf::as_path), &reached)?;
+        if output.is_none() && !report.is_json() {
+            report.note(line);
+            lines_to_stdout(&format!("{}\n", printable_json(&reached.best.latent.to_json()?)))?;
+        } else {
+            report.result(line, &value)?;
         }
-        let images = completed::Images {
-            model,
-            picture: &picture,
-            view: self.input.view(),
-            is_seen: self.shaded.normals.is_none(),
-            size: self.size,
-            overwrite,
-        };
+        Ok(Outcome::Fine)
+    }
+
+    /// Writes what a fit leaves.
+    fn keep(
+        &self,
+        best: &mut Best,
+        name: &Path,
+        output: Option<&PathBuf>,
+        seen: Option<&Picture>,
+        model: &FitModel,
+    ) -> Result<()> {
+        let overwrite = Overwrite::from(self.force);
+        best.latent.source = Some(source_of(name));
+        best.latent.model = Some(model.hash());
+        if let Some(output) = output {
+            best.latent.save(output, overwrite).map_err(with_remedy)?;
+        }
+        let images = completed::Images { model, seen, view: self.input.view(), size: self.size, overwrite };
         if let Some(path) = &self.completed {
-            images.completed(path, &fitted.best.latent)?;
+            images.completed(path, &best.latent)?;
         }
         if let Some(path) = &self.uncertainty {
-            images.uncertainty(path, &fitted.best)?;
+            images.uncertainty(path, best)?;
         }
-        self.print(path, output, &fitted, report)
+        Ok(())
     }
 
     fn fit(

@@ -50,6 +50,8 @@ pub enum Method {
 
 /// [`Objective::Energy`]'s share by default: docs/RESULTS.md, Where the light comes from.
 const SHARE: f64 = 0.05;
+/// Weight of the prior beside integrals of light: it decides what they leave open, and gives way where they do not.
+const LINEAR_PRIOR: f64 = 1e-6;
 /// Most latent vectors of a small code, which [`Method::Auto`] fits without exploring.
 const FEW: usize = 16;
 /// Updates of Levenberg–Marquardt after exploring.
@@ -152,6 +154,12 @@ impl FitConfig {
     /// For the light on a surface ([`fit_shaded`](super::fit_shaded)), whose loss is not a sum over the light's pixels.
     pub fn light() -> Self {
         Self { method: Method::Adam, learning_rate: exponential(5e-2, 2e-3, 400), ..Self::thorough() }
+    }
+
+    /// For integrals of light ([`fit_linear`](super::fit_linear)), exposure included, by Levenberg–Marquardt; Adam needs ten
+    /// times the steps.
+    pub fn linear() -> Self {
+        Self { prior: LINEAR_PRIOR, free_exposure: true, ..Self::thorough() }.in_steps(40)
     }
 
     /// The reference implementation's helper (figures, uniqueness): `steps` steps from `rate` to `last`.

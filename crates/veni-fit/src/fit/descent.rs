@@ -4,7 +4,6 @@ use super::FitResult;
 use super::config::{FitConfig, Method};
 use super::levenberg_marquardt::{QuadraticModel, Search};
 use super::network::{Evaluation, ImageLoss, Network};
-use super::pixel::PixelLoss;
 use super::plateau::PlateauDetector;
 use crate::{Adam, Error, Result};
 use veni_light::latent::{Latent, Prior};
@@ -21,20 +20,19 @@ pub(super) fn optimise(
     let n = start.first().map_or(0, |z| z.vectors.len());
     let standard = Prior::standard(n);
     let penalty = Penalty { prior: prior.unwrap_or(&standard), scale: config.prior / n.max(1) as f64 };
-    let pixels = match loss {
-        ImageLoss::Pixels(images) if network.is_folded() => Some(images.as_slice()),
-        _ if config.method == Method::LevenbergMarquardt => return Err(unsuited(loss)),
-        _ => None,
-    };
-    let [explore, finish] = config.plan(n, pixels.is_some());
+    let applies = network.is_folded() && loss.has_equations();
+    if config.method == Method::LevenbergMarquardt && !applies {
+        return Err(unsuited(loss));
+    }
+    let [explore, finish] = config.plan(n, applies);
     let descent = Descent { network, loss, penalty: &penalty, config };
     let mut trace = Trace { losses: Vec::new(), observer };
     let mut latents = start.to_vec();
     if explore > 0 {
         latents = descent.adam(&latents, explore, &mut trace)?;
     }
-    if let Some(images) = pixels.filter(|_| finish > 0) {
-        latents = descent.levenberg_marquardt(&latents, images, finish, &mut trace)?;
+    if finish > 0 {
+        latents = descent.levenberg_marquardt(&latents, finish, &mut trace)?;
     }
     let last = network.losses(&latents, loss)?;
     Ok(FitResult { latents, losses: trace.losses, last })
@@ -44,7 +42,7 @@ fn unsuited(loss: &ImageLoss<'_>) -> Error {
     let why = match loss {
         ImageLoss::Whole(_) => "the objective looks at whole images",
         ImageLoss::Shaded(_) => "the light on a surface is seen mixed, not pixel by pixel",
-        ImageLoss::Pixels(_) => "this decoder cannot be folded",
+        ImageLoss::Pixels(_) | ImageLoss::Linear(_) => "this decoder cannot be folded",
     };
     Error::invalid(format!("the method levenberg-marquardt does not apply: {why}; use adam, or auto"))
 }
@@ -158,27 +156,26 @@ impl Descent<'_> {
     fn levenberg_marquardt(
         &self,
         start: &[Latent],
-        images: &[PixelLoss<'_>],
         steps: u64,
         trace: &mut Trace<'_>,
     ) -> Result<Vec<Latent>> {
         let (curvature, free) = (self.penalty.curvature(), self.config.free_exposure);
-        let evaluate = |latent: &Latent, image: &PixelLoss<'_>| -> Result<QuadraticModel> {
-            let found = self.network.equations(latent, image)?;
+        let evaluate = |latent: &Latent, b: usize| -> Result<QuadraticModel> {
+            let found = self.network.equations(latent, self.loss, b)?;
             let (value, by) = self.penalty.at(&latent.vectors);
             Ok(QuadraticModel::new(found, free).plus(value, &by, &curvature))
         };
-        let begin = |(latent, image): (&Latent, &PixelLoss<'_>)| -> Result<Search> {
-            Ok(Search::new(latent.clone(), evaluate(latent, image)?))
+        let begin = |(b, latent): (usize, &Latent)| -> Result<Search> {
+            Ok(Search::new(latent.clone(), evaluate(latent, b)?))
         };
-        let mut searches = start.iter().zip(images).map(begin).collect::<Result<Vec<_>>>()?;
+        let mut searches = start.iter().enumerate().map(begin).collect::<Result<Vec<_>>>()?;
         for _ in 0..steps {
             trace.add(&searches.iter().map(Search::value).collect::<Vec<_>>())?;
             if searches.iter().all(Search::ended) {
                 break;
             }
-            for (search, image) in searches.iter_mut().zip(images).filter(|(search, _)| !search.ended()) {
-                search.step(|latent| evaluate(latent, image))?;
+            for (b, search) in searches.iter_mut().enumerate().filter(|(_, search)| !search.ended()) {
+                search.step(|latent| evaluate(latent, b))?;
             }
         }
         Ok(searches.into_iter().map(Search::into_latent).collect())

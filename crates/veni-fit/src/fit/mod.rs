@@ -8,6 +8,8 @@ mod config;
 mod decoder;
 mod descent;
 mod levenberg_marquardt;
+mod linear;
+mod linear_target;
 mod network;
 mod pixel;
 mod plateau;
@@ -19,8 +21,10 @@ mod tests;
 
 pub use config::{FitConfig, Method, Objective, Plateau};
 pub use decoder::{DecoderPasses, LatentDecoder, LatentGradient, PanoramaLoss};
+pub use linear::{fit_linear, likely_linear};
+pub use linear_target::{Achieved, LinearTarget, Received};
 pub use shaded::{fit_shaded, matching_exposure};
-pub use starts::{Best, best_light, best_of, from_each, random_starts};
+pub use starts::{Best, best_light, best_linear, best_of, from_each, random_starts};
 pub use target::FitTarget;
 
 use crate::{Error, Result};

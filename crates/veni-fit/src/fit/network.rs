@@ -4,6 +4,7 @@ use veni_light::field::{LocalQuadratic, NormalEquations};
 use veni_light::latent::Latent;
 
 use super::decoder::{DecoderPasses, FoldedPasses, LatentDecoder, LatentGradient, PanoramaLoss};
+use super::linear_target::LinearTarget;
 use super::pixel::PixelLoss;
 use crate::shade::ShadedImage;
 use crate::{Error, Result};
@@ -18,6 +19,15 @@ pub(crate) enum ImageLoss<'a> {
     /// The light of each latent through the surface of a photograph. The exposure is a property of the photograph, not of
     /// the light.
     Shaded(&'a [ShadedImage]),
+    /// The same integrals of every latent's light.
+    Linear(&'a LinearTarget),
+}
+
+impl ImageLoss<'_> {
+    /// Whether there are normal equations of each latent, given a decoder that folds.
+    pub(crate) fn has_equations(&self) -> bool {
+        matches!(self, Self::Pixels(_) | Self::Linear(_))
+    }
 }
 
 /// The losses at some latents, and their gradient.
@@ -93,21 +103,42 @@ impl<'a> Network<'a> {
                 })?;
                 LatentGradient { exposures, ..gradient }
             }
+            (_, ImageLoss::Linear(target)) => self.passes().backward(latents, &mut |prediction| {
+                let each = prediction.chunks_exact(prediction.len() / latents.len());
+                let (each, by_prediction): (Vec<_>, Vec<_>) = each.map(|p| target.with_gradient(p)).unzip();
+                losses = each;
+                Ok(by_prediction.concat())
+            })?,
         };
         Ok(Evaluation { losses, gradient })
     }
 
-    /// The normal equations of one image at its latent, for a decoder that [is folded](Network::is_folded).
-    pub(crate) fn equations(&self, latent: &Latent, image: &PixelLoss<'_>) -> Result<NormalEquations> {
+    /// The normal equations of the loss of image `b` at its latent, for a decoder that [is folded](Network::is_folded) and a
+    /// loss that [has them](ImageLoss::has_equations).
+    pub(crate) fn equations(
+        &self,
+        latent: &Latent,
+        loss: &ImageLoss<'_>,
+        b: usize,
+    ) -> Result<NormalEquations> {
         let Self::Folded(FoldedPasses { decoder, directions }) = self else {
             return Err(Error::invalid("normal equations are those of a folded decoder"));
         };
-        let at = |i: usize, p: [f32; 3]| {
-            let value = image.at(i, p.map(f64::from));
-            let [gradient, weight] = [value.gradient, value.curvature].map(|v| v.map(|v| v as f32));
-            LocalQuadratic { loss: value.loss, gradient, weight }
-        };
-        Ok(decoder.condition(latent)?.normal_equations(directions, at))
+        let field = decoder.condition(latent)?;
+        match loss {
+            ImageLoss::Pixels(images) => Ok(field.normal_equations(directions, |i, p| {
+                let value = images[b].at(i, p.map(f64::from));
+                let [gradient, weight] = [value.gradient, value.curvature].map(|v| v.map(|v| v as f32));
+                LocalQuadratic { loss: value.loss, gradient, weight }
+            })),
+            ImageLoss::Linear(target) => {
+                let (weights, count) = target.weights();
+                Ok(target.equations(&field.moments(directions, weights, count)))
+            }
+            ImageLoss::Whole(_) | ImageLoss::Shaded(_) => {
+                Err(Error::invalid("normal equations are those of pixels or of integrals"))
+            }
+        }
     }
 
     /// The loss of each image alone.
@@ -117,6 +148,11 @@ impl<'a> Network<'a> {
             ImageLoss::Pixels(images) => pixel_losses(&self.passes().forward(latents)?, images).0,
             ImageLoss::Shaded(images) => {
                 lit(&self.passes().forward(&without_exposure(latents))?, images, latents).losses
+            }
+            ImageLoss::Linear(target) => {
+                let prediction = self.passes().forward(latents)?;
+                let each = prediction.chunks_exact(prediction.len() / latents.len());
+                each.map(|p| target.with_gradient(p).0).collect()
             }
         })
     }

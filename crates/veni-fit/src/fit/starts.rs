@@ -1,6 +1,9 @@
 //! Several starts for one image: the best of them, and how much they disagree.
 
-use super::{FitConfig, FitResult, FitTarget, LatentDecoder, fit_shaded, fit_with};
+use super::{
+    FitConfig, FitResult, FitTarget, LatentDecoder, LinearTarget, fit_linear, fit_shaded, fit_with,
+    likely_linear,
+};
 use crate::Result;
 use crate::shade::ShadedImage;
 use veni_light::latent::{Latent, Prior};
@@ -67,6 +70,39 @@ pub fn best_light(
     let image = std::slice::from_ref(image);
     from_each(starts, config, observer, |start, observer| {
         fit_shaded(decoder, image, prior, start, config, observer)
+    })
+}
+
+/// [`best_of`] for integrals of the light: [`likely_linear`] from the first start, [`fit_linear`] from the others, so that these
+/// differ in what the integrals leave open. Losses include the prior.
+///
+/// # Errors
+/// As [`fit_linear`].
+///
+/// # Panics
+/// If there is no start.
+pub fn best_linear(
+    decoder: &dyn LatentDecoder,
+    target: &LinearTarget,
+    prior: &Prior,
+    starts: &[Latent],
+    config: &FitConfig,
+    observer: &mut dyn FnMut(u64, f64),
+) -> Result<Best> {
+    let (mut first, mut made) = (true, 0);
+    // the first start makes more updates than the others
+    let mut count = |_, loss| {
+        observer(made, loss);
+        made += 1;
+    };
+    from_each(starts, config, &mut count, |start, observer| {
+        let fit = if std::mem::take(&mut first) { likely_linear } else { fit_linear };
+        let mut found = fit(decoder, target, Some(prior), start, config, observer)?;
+        let scale = config.prior / prior.latent_vectors().max(1) as f64;
+        for (loss, latent) in found.last.iter_mut().zip(&found.latents) {
+            *loss += scale * prior.energy(&latent.vectors).0;
+        }
+        Ok(found)
     })
 }
 

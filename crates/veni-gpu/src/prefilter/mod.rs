@@ -1,7 +1,7 @@
 //! [`GpuPrefilter`]: harmonics and prefiltered cube maps of latents, without leaving the device.
 //!
-//! A latent's radiance on rings of latitude gives its spherical harmonics (LIGHT (17)); harmonics times one number per degree,
-//! summed in every direction, give a level (LIGHT (18)). Nothing is sampled at random, so nothing is noisy from frame to frame.
+//! A latent's radiance on rings of latitude gives its spherical harmonics (LIGHT (19)); harmonics times one number per degree,
+//! summed in every direction, give a level (LIGHT (20)). Nothing is sampled at random, so nothing is noisy from frame to frame.
 //!
 //! ```no_run
 //! use veni_gpu::wgpu::{CommandEncoder, Texture};

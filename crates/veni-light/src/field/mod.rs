@@ -39,7 +39,7 @@ use weights::Weights;
 pub mod training;
 
 pub use evaluator::Evaluator;
-pub use gradient::{Gradient, LocalQuadratic, NormalEquations};
+pub use gradient::{Gradient, LocalQuadratic, Moments, NormalEquations};
 pub use rate::multiply_add_rate;
 
 /// Largest |z_x|, |z_y| of a latent. Beyond it f32 does not resolve the phase of the encoding; trained codes

@@ -24,22 +24,21 @@ const HOT: f32 = std::f32::consts::LN_2;
 /// What the images are made from.
 pub(super) struct Images<'a> {
     pub(super) model: &'a FitModel,
-    pub(super) picture: &'a Picture,
+    /// The picture of the panorama or of a part of it, if there is one.
+    pub(super) seen: Option<&'a Picture>,
     pub(super) view: Option<View>,
-    /// Whether the picture shows the panorama, or a surface lit by it.
-    pub(super) is_seen: bool,
     pub(super) size: Option<Size>,
     pub(super) overwrite: Overwrite,
 }
 
 impl Images<'_> {
     fn grid(&self) -> Result<Equirect> {
-        let [width, height] = match (self.size, self.view) {
-            (Some(size), _) => {
+        let [width, height] = match (self.size, self.view, self.seen) {
+            (Some(size), _, _) => {
                 let (width, height) = size.equirect()?;
                 [width, height]
             }
-            (None, None) if self.is_seen => self.picture.size(),
+            (None, None, Some(picture)) => picture.size(),
             _ => GRID,
         };
         Ok(Equirect::new(width, height))
@@ -50,10 +49,8 @@ impl Images<'_> {
         let grid = self.grid()?;
         let decoded = self.model.decode(grid, latent)?;
         let mut pixels: Vec<_> = decoded.as_chunks::<3>().0.iter().map(|p| p.map(f32::exp)).collect();
-        if !self.is_seen {
-            return self.write(path, &Panorama::new(grid, pixels));
-        }
-        let (known, seen) = self.seen(grid);
+        let Some(picture) = self.seen else { return self.write(path, &Panorama::new(grid, pixels)) };
+        let (known, seen) = self.known(picture, grid);
         for ((pixel, known), seen) in pixels.iter_mut().zip(&known).zip(&seen) {
             for (p, s) in pixel.iter_mut().zip(seen) {
                 *p = *p * (1.0 - known) + s * known;
@@ -63,14 +60,14 @@ impl Images<'_> {
     }
 
     /// How much of each pixel is known, and its radiance there.
-    fn seen(&self, grid: Equirect) -> (Vec<f32>, Vec<[f32; 3]>) {
-        let [width, height] = self.picture.size();
+    fn known(&self, picture: &Picture, grid: Equirect) -> (Vec<f32>, Vec<[f32; 3]>) {
+        let [width, height] = picture.size();
         let known = |p: usize| {
-            let finite = self.picture.pixels()[p].iter().all(|v| v.is_finite());
-            if finite { self.picture.known().map_or(1.0, |k| k[p].clamp(0.0, 1.0)) } else { 0.0 }
+            let finite = picture.pixels()[p].iter().all(|v| v.is_finite());
+            if finite { picture.known().map_or(1.0, |k| k[p].clamp(0.0, 1.0)) } else { 0.0 }
         };
         let known: Vec<f32> = (0..width * height).map(known).collect();
-        let radiance = |p: usize| if known[p] > 0.0 { self.picture.pixels()[p] } else { [0.0; 3] };
+        let radiance = |p: usize| if known[p] > 0.0 { picture.pixels()[p] } else { [0.0; 3] };
         if let Some(view) = &self.view {
             let at = |d: [f32; 3]| view.pixel_of(d, width, height);
             let hits: Vec<_> = grid.directions().into_iter().map(at).collect();

@@ -19,18 +19,18 @@ const LONGEST: usize = 96;
 #[derive(Args, Debug)]
 pub(crate) struct Input {
     /// OpenEXR, Radiance, PNG, JPEG or WebP files; - is standard input
-    #[arg(required = true, value_name = "PICTURE")]
+    #[arg(required_unless_present_any = ["target_sh", "target_irradiance", "illuminance"], value_name = "PICTURE")]
     pub(super) pictures: Vec<PathBuf>,
 
     #[command(flatten)]
     layer: Layer,
 
     /// Picture of the same size: white is known, black or transparent unknown
-    #[arg(long, value_name = "MASK")]
+    #[arg(long, value_name = "MASK", requires = "pictures")]
     mask: Option<PathBuf>,
 
     /// The picture is a photograph with this field of view across its width
-    #[arg(long, value_name = "DEGREES")]
+    #[arg(long, value_name = "DEGREES", requires = "pictures")]
     fov: Option<f64>,
 
     /// Where the photograph's centre looks: azimuth (counter-clockwise from the panorama's centre, seen from above),

@@ -46,8 +46,8 @@ pub(super) struct Settings {
     #[arg(long, value_name = "PART")]
     share: Option<f64>,
 
-    /// Weight of the model's prior over latents; 0 turns it off [default: 0.0001, 0.00001 for more than 16 vectors, and
-    /// 0.02 where part of the sphere is unknown; with the presets of the papers 0]
+    /// Weight of the model's prior over latents; 0 turns it off [default: 0.0001, 0.00001 for more than 16 vectors,
+    /// 0.02 where part of the sphere is unknown, 0.000001 without a picture; with the presets of the papers 0]
     #[arg(long, value_name = "WEIGHT")]
     prior: Option<f64>,
 
@@ -59,7 +59,7 @@ pub(super) struct Settings {
     #[arg(long, value_enum)]
     start: Option<Start>,
 
-    /// Number of starts; all but the first are random [default: 1, or 4 where part of the sphere is unknown]
+    /// Number of starts; all but the first are random [default: 1, or 4 where part of the sphere is unknown; without a picture 1]
     #[arg(long, value_name = "K")]
     starts: Option<usize>,
 
@@ -71,7 +71,7 @@ pub(super) struct Settings {
     #[arg(long)]
     no_plateau: bool,
 
-    /// Size at which a panorama is fitted [default: 128x64, or 64x32 where part of it is unknown]
+    /// Size at which a panorama is fitted, or light summed [default: 128x64, or 64x32 where part of a picture is unknown]
     #[arg(long, value_name = "W|WxH")]
     resolution: Option<Size>,
 }
@@ -171,29 +171,7 @@ impl Settings {
             #[cfg(feature = "learn")]
             Preset::Renipp => FitConfig::reni_evaluation(),
         };
-        if let Some(steps) = self.steps {
-            config = config.in_steps(steps);
-        }
-        match (self.method, self.rate) {
-            (Some(MethodName::LevenbergMarquardt), Some(_)) => bail!(
-                "--rate: levenberg-marquardt finds its steps itself; leave --rate out, or take --method adam or auto"
-            ),
-            (Some(MethodName::LevenbergMarquardt), None) if light => bail!(
-                "--method levenberg-marquardt does not apply to the light on a surface; leave it out, or take adam"
-            ),
-            (Some(MethodName::LevenbergMarquardt), None) => config.method = Method::LevenbergMarquardt,
-            (Some(MethodName::Auto), _) => config.method = Method::Auto,
-            (Some(MethodName::Adam), _) | (None, Some(_)) => config.method = Method::Adam,
-            (None, None) => {}
-        }
-        if let Some((first, last)) = self.rate {
-            config.learning_rate = match (config.learning_rate, last) {
-                (LearningRate::Exponential { steps, warm_up, before, ramp, .. }, Some(last)) => {
-                    LearningRate::Exponential { rate: first, last, steps, warm_up, before, ramp }
-                }
-                _ => LearningRate::Constant { rate: first },
-            };
-        }
+        config = self.descended(config, light)?;
         if let Some(objective) = self.objective {
             config.objective = match objective {
                 ObjectiveName::Log => Objective::LogError,
@@ -222,6 +200,45 @@ impl Settings {
         if self.no_plateau {
             config.plateau = None;
         }
+        config.check()?;
+        Ok(config)
+    }
+
+    /// The number of steps, the method and the learning rate.
+    fn descended(&self, mut config: FitConfig, light: bool) -> Result<FitConfig> {
+        if let Some(steps) = self.steps {
+            config = config.in_steps(steps);
+        }
+        match (self.method, self.rate) {
+            (Some(MethodName::LevenbergMarquardt), Some(_)) => bail!(
+                "--rate: levenberg-marquardt finds its steps itself; leave --rate out, or take --method adam or auto"
+            ),
+            (Some(MethodName::LevenbergMarquardt), None) if light => bail!(
+                "--method levenberg-marquardt does not apply to the light on a surface; leave it out, or take adam"
+            ),
+            (Some(MethodName::LevenbergMarquardt), None) => config.method = Method::LevenbergMarquardt,
+            (Some(MethodName::Auto), _) => config.method = Method::Auto,
+            (Some(MethodName::Adam), _) | (None, Some(_)) => config.method = Method::Adam,
+            (None, None) => {}
+        }
+        if let Some((first, last)) = self.rate {
+            config.learning_rate = match (config.learning_rate, last) {
+                (LearningRate::Exponential { steps, warm_up, before, ramp, .. }, Some(last)) => {
+                    LearningRate::Exponential { rate: first, last, steps, warm_up, before, ramp }
+                }
+                _ => LearningRate::Constant { rate: first },
+            };
+        }
+        Ok(config)
+    }
+
+    /// For integrals of the light, under a decoder that `folds` or does not.
+    pub(super) fn for_integrals(&self, folds: bool) -> Result<FitConfig> {
+        let plateau = (!self.no_plateau).then_some(PLATEAU);
+        let usual = FitConfig { method: Method::LevenbergMarquardt, plateau, ..FitConfig::linear() };
+        let slow = FitConfig { method: Method::Adam, ..usual }.in_steps(10 * usual.steps);
+        let mut config = self.descended(if folds { usual } else { slow }, false)?;
+        config.prior = self.prior.unwrap_or(config.prior);
         config.check()?;
         Ok(config)
     }
@@ -256,6 +273,11 @@ impl Settings {
         };
         let default = if whole { 1 } else { STARTS };
         (start, self.starts.unwrap_or(default).max(1))
+    }
+
+    /// The same without a picture: what it leaves open is left to the prior, not to several starts.
+    pub(super) fn start_unseen(&self) -> (Start, usize) {
+        (self.start.unwrap_or(Start::Zero), self.starts.unwrap_or(1).max(1))
     }
 
     pub(super) fn seed(&self) -> u64 {

@@ -23,7 +23,7 @@ use crate::output::CAMERA;
 pub(super) struct Shaded {
     /// The picture shows a surface with these normals (world axes, z up, as 'render-probe --normals' writes them):
     /// find the light on it
-    #[arg(long, value_name = "NORMALS", requires = "output")]
+    #[arg(long, value_name = "NORMALS", requires_all = ["output", "pictures"])]
     pub(super) normals: Option<PathBuf>,
 
     /// Albedo of the surface: one number or three, 0 to 1

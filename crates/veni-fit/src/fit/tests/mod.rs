@@ -1,6 +1,7 @@
 //! Latents that are found again, masks, clipping, exposures, settings: everything that needs no graph of tensors.
 
 mod levenberg_marquardt;
+mod linear;
 
 use super::pixel::PixelValue;
 use super::*;

@@ -11,6 +11,8 @@
 
 mod backward;
 mod chain;
+mod jacobian;
+mod moments;
 mod normal;
 mod operations;
 mod outer;
@@ -29,7 +31,8 @@ use super::aligned::Aligned;
 use crate::tasks;
 use backward::{Backward, Sums};
 
-pub(super) use normal::ValueOutput;
+pub(super) use jacobian::ValueOutput;
+pub use moments::Moments;
 pub use normal::{LocalQuadratic, NormalEquations};
 pub(super) use transposed::Transposed;
 

@@ -8,13 +8,13 @@
 use pulp::{Simd, WithSimd};
 
 use super::in_tasks;
+use super::jacobian::{Chain, Rows};
 use super::operations::accumulate_product;
 use super::outer::{self, Wide};
-use super::pass::{BackwardVisitor, Pass, flat, flat_mut, lane_sum};
+use super::pass::{Pass, flat, flat_mut, lane_sum};
 use crate::field::aligned::Aligned;
-use crate::field::block::{Row, VECTORS, product};
-use crate::field::mlp::{Matrix, Mlp, PANEL};
-use crate::field::weights::{Affine, Weights};
+use crate::field::block::VECTORS;
+use crate::field::mlp::Mlp;
 use crate::field::{Field, Folded};
 
 /// Fewest directions of a task, and about how many tasks: each has a matrix of its own.
@@ -92,63 +92,6 @@ impl NormalEquations {
     }
 }
 
-/// The fused value–output projection of one layer's attention, [3N, h]: a row for a₁, a₂ and z of every vector.
-#[derive(Debug)]
-pub(in crate::field) struct ValueOutput(Vec<f32>);
-
-impl ValueOutput {
-    pub(in crate::field) fn new(value: &Affine, out: &Affine) -> Self {
-        let (inner, h) = (value.bias.len(), out.bias.len());
-        let rows = value.weight.chunks_exact(inner).flat_map(|row| {
-            let mut sum = vec![0.0; h];
-            for (v, out) in row.iter().zip(out.weight.chunks_exact(h)) {
-                sum.iter_mut().zip(out).for_each(|(sum, w)| *sum += v * w);
-            }
-            sum
-        });
-        Self(rows.collect())
-    }
-}
-
-/// From the gradient with respect to what a layer's attention adds to that with respect to the vectors' radii and heights.
-///
-/// The invariants a₁, a₂ of a vector depend on r² = x² + y² alone: their gradients with respect to x and y are those by a
-/// number ρ, times x and y.
-struct Chain<'a> {
-    /// x, y of the vectors.
-    vectors: &'a [[f32; 2]],
-    /// One per layer: [h, 2N], ρ of all vectors, then z of all.
-    layers: Vec<Matrix>,
-}
-
-impl<'a> Chain<'a> {
-    fn new(weights: &Weights, folded: &'a Folded) -> Self {
-        let (h, vectors) = (weights.mlp.hidden, folded.vectors.as_slice());
-        let derivatives: Vec<[f32; 2]> = vectors
-            .iter()
-            .map(|[x, y]| weights.invariant.derivative(f64::from(*x).hypot(f64::from(*y))).map(|s| s as f32))
-            .collect();
-        let n = vectors.len();
-        let layer = |ValueOutput(value_output): &ValueOutput| {
-            let mut matrix = vec![0.0; 2 * n * h];
-            for (j, (rows, [p, q])) in value_output.chunks_exact(3 * h).zip(&derivatives).enumerate() {
-                let (a, b, z) = (&rows[..h], &rows[h..2 * h], &rows[2 * h..]);
-                for i in 0..h {
-                    matrix[2 * n * i + j] = p * a[i] + q * b[i];
-                    matrix[2 * n * i + n + j] = z[i];
-                }
-            }
-            Matrix::new(&matrix, 2 * n)
-        };
-        Self { vectors, layers: weights.value_output().iter().map(layer).collect() }
-    }
-
-    /// 2N rounded up to whole panels.
-    fn padded(&self) -> usize {
-        (2 * self.vectors.len()).next_multiple_of(PANEL)
-    }
-}
-
 /// A loss by direction and log radiance.
 type QuadraticLoss<'a> = dyn Fn(usize, [f32; 3]) -> LocalQuadratic + Sync + 'a;
 
@@ -187,10 +130,7 @@ impl WithSimd for Normal<'_> {
         let (matrix, workspace) = workspace.split_at_mut(wide * panels * unknowns);
         let (transposed, matrix) = (transposed.as_chunks_mut().0, matrix.as_chunks_mut().0);
         let gradient = &mut workspace[..unknowns];
-        // the last coordinate, the log exposure, adds to every log radiance alike
-        jacobian[unknowns - 1] = [simd.splat_f32s(1.0); VECTORS];
-        let zeros = vec![0.0; chain.padded()];
-        let mut rows = Rows { chain, zeros: &zeros, jacobian, polar };
+        let mut rows = Rows::new(simd, chain, jacobian, polar);
 
         for (b, directions) in directions.chunks(lanes).enumerate() {
             pass.forward(simd, directions);
@@ -211,21 +151,15 @@ impl WithSimd for Normal<'_> {
                 }
             }
             for c in 0..3 {
-                pass.adjoint.as_flattened_mut().fill(zero);
-                pass.adjoint[c] = [simd.splat_f32s(1.0); VECTORS];
-                rows.polar.as_flattened_mut().fill(zero);
-                pass.backward(simd, &mut rows);
-                rows.finish(simd);
-                for ((weighted, row), sum) in
-                    weighted.iter_mut().zip(rows.jacobian.iter()).zip(&mut *gradient)
-                {
+                let jacobian = rows.of_colour(simd, &mut pass, c);
+                for ((weighted, row), sum) in weighted.iter_mut().zip(jacobian).zip(&mut *gradient) {
                     for v in 0..VECTORS {
                         weighted[v] = simd.mul_f32s(row[v], weights[c][v]);
                     }
                     *sum = accumulate_product(simd, *sum, row, &gradients[c]);
                 }
                 outer::transpose::<S>(weighted, transposed);
-                outer::add(simd, rows.jacobian, transposed, matrix);
+                outer::add(simd, jacobian, transposed, matrix);
             }
         }
         for (sum, vector) in sums.gradient.iter_mut().zip(gradient) {
@@ -236,50 +170,6 @@ impl WithSimd for Normal<'_> {
             row.fill(0.0);
             outer::read::<S>(matrix, unknowns, k, &mut row);
             sums.iter_mut().zip(&row).for_each(|(sum, value)| *sum += f64::from(*value));
-        }
-    }
-}
-
-/// The rows of the Jacobian of one colour, for a block.
-struct Rows<'a, S: Simd> {
-    chain: &'a Chain<'a>,
-    zeros: &'a [f32],
-    /// A row for each coordinate.
-    jacobian: &'a mut [Row<S>],
-    /// By ρ and z of all vectors.
-    polar: &'a mut [Row<S>],
-}
-
-impl<S: Simd> Rows<'_, S> {
-    /// Adds what came through the attention.
-    #[inline(always)]
-    fn finish(&mut self, simd: S) {
-        let (radii, heights) = self.polar.split_at(self.chain.vectors.len());
-        let coordinates = self.jacobian.as_chunks_mut::<3>().0.iter_mut().zip(self.chain.vectors);
-        for (([by_x, by_y, by_z], [x, y]), (radius, height)) in coordinates.zip(radii.iter().zip(heights)) {
-            let (x, y) = (simd.splat_f32s(*x), simd.splat_f32s(*y));
-            for v in 0..VECTORS {
-                by_x[v] = simd.mul_add_e_f32s(radius[v], x, by_x[v]);
-                by_y[v] = simd.mul_add_e_f32s(radius[v], y, by_y[v]);
-            }
-            *by_z = *height;
-        }
-    }
-}
-
-impl<S: Simd> BackwardVisitor<S> for Rows<'_, S> {
-    #[inline(always)]
-    fn added(&mut self, simd: S, at: usize, gradient: &[Row<S>]) {
-        // nothing of the latent is added after the last layer
-        if let Some(matrix) = self.chain.layers.get(at) {
-            product::<S, true, false>(simd, matrix, self.zeros, gradient, self.polar);
-        }
-    }
-
-    #[inline(always)]
-    fn product(&mut self, simd: S, j: usize, v: usize, gradient: S::f32s, direction: [S::f32s; 2]) {
-        for (row, direction) in self.jacobian[3 * j..].iter_mut().zip(direction) {
-            row[v] = simd.mul_f32s(gradient, direction);
         }
     }
 }

@@ -20,10 +20,9 @@ fn found(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> NormalEquat
     model.decoder().unwrap().condition(latent).unwrap().normal_equations(directions, loss)
 }
 
-/// Jᵀ diag(ℓ″) J with J by central differences, row-major; and the directions it is of, those of `directions` in which no
-/// difference crosses the kink of a ReLU.
-fn expected(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> (Vec<[f32; 3]>, Vec<f64>) {
-    let (plain, unknowns) = (Plain(model), 3 * latent.vectors.len() + 1);
+/// ∂P/∂(latent) in a direction by central differences of the plain network, exposure last; nothing where a difference crosses
+/// the kink of a ReLU.
+pub(super) fn slopes(plain: &Plain<'_>, latent: &Latent, d: [f32; 3]) -> Option<Vec<[f64; 3]>> {
     let moved = |k: usize, step: f32| {
         let mut moved = latent.clone();
         let at = match moved.vectors.as_flattened_mut().get_mut(k) {
@@ -34,23 +33,26 @@ fn expected(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> (Vec<[f3
         let at = f64::from(*at);
         (moved, at)
     };
-    let rows = |d: &[f32; 3]| -> Option<Vec<[f64; 3]>> {
-        let middle = plain.log_radiance(latent, *d);
-        let row = |k: usize| {
-            // f32 latents resolve it
-            let ((high, up), (_, at), (low, down)) =
-                (moved(k, 1.0 / 65536.0), moved(k, 0.0), moved(k, -1.0 / 65536.0));
-            let (high, low) = (plain.log_radiance(&high, *d), plain.log_radiance(&low, *d));
-            let after = [0, 1, 2].map(|c| (high[c] - middle[c]) / (up - at));
-            let before = [0, 1, 2].map(|c| (middle[c] - low[c]) / (at - down));
-            let smooth = (0..3).all(|c| (after[c] - before[c]).abs() < 1e-3 + 1e-2 * before[c].abs());
-            smooth.then(|| [0, 1, 2].map(|c| 0.5 * (after[c] + before[c])))
-        };
-        (0..unknowns).map(row).collect()
+    let middle = plain.log_radiance(latent, d);
+    let row = |k: usize| {
+        // f32 latents resolve it
+        let ((high, up), (_, at), (low, down)) =
+            (moved(k, 1.0 / 65536.0), moved(k, 0.0), moved(k, -1.0 / 65536.0));
+        let (high, low) = (plain.log_radiance(&high, d), plain.log_radiance(&low, d));
+        let after = [0, 1, 2].map(|c| (high[c] - middle[c]) / (up - at));
+        let before = [0, 1, 2].map(|c| (middle[c] - low[c]) / (at - down));
+        let smooth = (0..3).all(|c| (after[c] - before[c]).abs() < 1e-3 + 1e-2 * before[c].abs());
+        smooth.then(|| [0, 1, 2].map(|c| 0.5 * (after[c] + before[c])))
     };
+    (0..=3 * latent.vectors.len()).map(row).collect()
+}
+
+/// Jᵀ diag(ℓ″) J with J by [`slopes`], row-major; and the directions it is of, those of `directions` that have them.
+fn expected(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> (Vec<[f32; 3]>, Vec<f64>) {
+    let (plain, unknowns) = (Plain(model), 3 * latent.vectors.len() + 1);
     let (mut kept, mut matrix) = (Vec::new(), vec![0.0; unknowns * unknowns]);
     for d in directions {
-        let Some(rows) = rows(d) else { continue };
+        let Some(rows) = slopes(&plain, latent, *d) else { continue };
         let weight = loss(kept.len(), [0.0; 3]).weight.map(f64::from);
         kept.push(*d);
         for (j, a) in rows.iter().enumerate() {
@@ -64,13 +66,13 @@ fn expected(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> (Vec<[f3
 }
 
 /// The largest difference, in parts of the largest entry.
-fn apart(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn apart(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let scale = b.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale
 }
 
-fn at(n: usize) -> Latent {
+pub(super) fn at(n: usize) -> Latent {
     Latent { log_exposure: 0.25, ..Latent::from_seed(&Prior::standard(n), 3) }
 }
 

@@ -15,6 +15,7 @@ use super::environment::EnvironmentMap;
 use crate::{Error, Result};
 
 pub use basis::Basis;
+pub use pixels::pixel_integrals;
 pub use pull_back::pull_back_irradiance;
 pub use window::Windowed;
 

@@ -24,6 +24,19 @@ pub(super) struct Integrals {
     columns: Vec<(f64, f64)>,
 }
 
+/// ∫ Y_lm dω over every pixel of `grid`, row-major, (`order` + 1)² numbers a pixel in the order of [`Sh`]: with them the
+/// [moments](crate::field::Field::moments) of a field are its coefficients, those of [`Sh::of_field`].
+pub fn pixel_integrals(grid: Equirect, order: usize) -> Vec<f32> {
+    let (integrals, count) = (Integrals::new(grid, order), (order + 1) * (order + 1));
+    let mut all = Vec::with_capacity(grid.len() * count);
+    let mut one = vec![0.0; count];
+    for index in 0..grid.len() {
+        integrals.of_pixel(index % grid.width, index / grid.width, &mut one);
+        all.extend(one.iter().map(|v| *v as f32));
+    }
+    all
+}
+
 impl Integrals {
     pub(super) fn new(grid: Equirect, order: usize) -> Self {
         let (basis, bands) = (Basis::new(order), (order + 1) * (order + 2) / 2);
