@@ -1,4 +1,4 @@
-//! The CPU decoder with filler weights: `cargo bench -p veni-core --no-default-features --bench field`.
+//! The CPU decoder with filler weights: `cargo bench -p veni-light --features parallel --bench field`.
 
 use std::hint::black_box;
 

@@ -9,12 +9,14 @@ use super::Cli;
 use crate::features::{GPU, LEARN};
 
 /// Options of cargo and other programs, which documents and messages name too.
-const FOREIGN: [&str; 21] = [
+const FOREIGN: [&str; 27] = [
     "array",
     "bench",
     "cases",
     "check",
+    "compare",
     "cpus-per-task",
+    "details",
     "edges",
     "example",
     "export",
@@ -22,8 +24,12 @@ const FOREIGN: [&str; 21] = [
     "mixed",
     "no-default-features",
     "nocapture",
+    "only",
+    "panorama",
     "path",
+    "picture",
     "release",
+    "sampler",
     "samples",
     "scope",
     "signal",
