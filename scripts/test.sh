@@ -5,9 +5,11 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/setup.sh
 # gpu: the golden fields are computed by the GPU decoder too. ndarray: the golden numbers run on both CPU devices.
-# ndarray is compiled for that alone: optimised less, it takes minutes less.
+# What only tests use is not optimised: that takes minutes of compiling off, and adds seconds of running.
 test=(cargo test --release --workspace --features "veni/gpu,veni/ndarray,veni-cli/ndarray")
-test+=(--config profile.release.package.burn-ndarray.opt-level=1)
+for package in burn-ndarray criterion naga_oil; do
+    test+=(--config "profile.release.package.$package.opt-level=0")
+done
 if (($#)); then
     exec "${test[@]}" "$@"
 fi
