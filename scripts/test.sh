@@ -1,15 +1,11 @@
 #!/usr/bin/env bash
-# Runs every test, with the one build profile of the project, but those that train on a graphics device (.ci/run).
+# Runs every test, with the one build profile of the project, but those on burn's other devices, ndarray and wgpu (.ci/run).
 # Arguments, if any, go to cargo test and choose instead: scripts/test.sh -p veni-light --lib sphere
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/setup.sh
-# gpu: the golden fields are computed by the GPU decoder too. ndarray: the golden numbers run on both CPU devices.
-# What only tests use is not optimised: that takes minutes of compiling off, and adds seconds of running.
-test=(cargo test --release --workspace --features "veni/gpu,veni/ndarray,veni-cli/ndarray")
-for package in burn-ndarray criterion naga_oil; do
-    test+=(--config "profile.release.package.$package.opt-level=0")
-done
+# gpu: the golden fields are computed by the GPU decoder too.
+test=(cargo test --release --workspace --features veni/gpu)
 if (($#)); then
     exec "${test[@]}" "$@"
 fi
