@@ -3,6 +3,8 @@
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
+#[cfg(unix)]
+use crate::util::interrupt;
 use crate::util::{Dir, text};
 
 /// A bake that takes long enough to be disturbed.
@@ -64,6 +66,9 @@ fn signal(child: &Child, signal: &str) {
 fn signals_end_it_at_once_and_leave_nothing() {
     use std::os::unix::process::ExitStatusExt;
     for (name, number) in [("-INT", 2), ("-TERM", 15), ("-HUP", 1)] {
+        if name == "-INT" && interrupt() != name {
+            continue;
+        }
         let dir = Dir::new();
         // two files at once
         let mut child = slow(&dir, &["-o", "big.exr", "-o", "big.hdr", "--size", "8192"]);

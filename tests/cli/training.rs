@@ -3,7 +3,7 @@
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::util::{Dir, Run, model, panoramas, text, train_args};
+use crate::util::{Dir, Run, interrupt, model, panoramas, text, train_args};
 
 /// More than are made before a run is interrupted, few enough to wait for.
 const STEPS: &str = "60";
@@ -147,7 +147,8 @@ fn interrupted_runs_end_as_if_nothing_had_happened() {
         assert!(Instant::now() < deadline, "the resumed run does not move");
         std::thread::sleep(Duration::from_millis(2));
     }
-    let signal = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let signal =
+        std::process::Command::new("kill").args([interrupt(), &child.id().to_string()]).status().unwrap();
     assert!(signal.success());
     let run = end(child);
     assert_eq!(run.code, Some(1), "stopped on request: {}{}", run.out, run.err);

@@ -145,3 +145,13 @@ pub(crate) fn model() -> &'static str {
     });
     path
 }
+
+/// How a process is asked to stop: as Ctrl-C does, unless that is ignored here, as it is in the background of a shell without job
+/// control, and so by every process that is started from here.
+#[cfg(unix)]
+pub(crate) fn interrupt() -> &'static str {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    if ignored & 0b10 == 0 { "-INT" } else { "-TERM" }
+}
