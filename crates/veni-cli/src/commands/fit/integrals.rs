@@ -26,14 +26,19 @@ const FINE: (usize, usize) = (256, 128);
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Light that is not seen")]
 pub(super) struct Integrals {
-    /// Instead of a picture: the spherical harmonics of radiance that the light is to have (JSON: what 'veni-cli light -o'
-    /// writes, or a list of [r,g,b]; 1, 4, 9, 16 ... of them, native frame, orthonormal, with the Condon-Shortley sign)
+    // not as a doc comment, which takes brackets for links
+    #[arg(
+        help = "Instead of a picture: the spherical harmonics of radiance that the light is to have (JSON: what 'veni-cli \
+        light -o' writes, or a list of [r,g,b]; 1, 4, 9, 16 ... of them, native frame, orthonormal, with the \
+        Condon-Shortley sign)"
+    )]
     #[arg(long, value_name = "FILE", conflicts_with_all = ["pictures", "mask", "fov", "normals", "layer", "preset",
         "objective", "share", "exposure"])]
     target_sh: Option<PathBuf>,
 
-    /// Instead of a picture, or beside --target-sh: what surfaces receive (JSON: a list of {"normal":[x,y,z],
-    /// "irradiance":[r,g,b]} or {"normal":[x,y,z],"illuminance":y}, or what 'veni-cli light -o' writes)
+    #[arg(help = "Instead of a picture, or beside --target-sh: what surfaces receive (JSON: a list of \
+        {\"normal\":[x,y,z],\"irradiance\":[r,g,b]} or {\"normal\":[x,y,z],\"illuminance\":y}, or what 'veni-cli light -o' \
+        writes)")]
     #[arg(long, value_name = "FILE", conflicts_with_all = ["pictures", "mask", "fov", "normals", "layer", "preset",
         "objective", "share", "exposure"])]
     target_irradiance: Option<PathBuf>,
