@@ -4,6 +4,7 @@ mod cpu;
 mod directions;
 #[cfg(feature = "gpu")]
 pub(crate) mod gpu;
+mod on_cube;
 
 use anyhow::Result;
 use veni_light::field::{Decoder, Field};

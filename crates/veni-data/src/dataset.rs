@@ -9,6 +9,7 @@ use crate::whole::whole;
 use crate::{Error, Result};
 use veni_image::exposure::centre_exposure;
 use veni_image::{Budget, Panorama, ReadOptions};
+use veni_light::light::{LightOptions, Lights};
 use veni_light::progress::{Observer, Silent};
 use veni_light::sphere::Equirect;
 
@@ -21,6 +22,8 @@ pub struct Item {
     pub log_radiance: Pixels,
     /// What was subtracted: the solid-angle-weighted mean of ln(luminance).
     pub log_exposure: f32,
+    /// The compact lights that were taken out before, at the same exposure: their irradiance is divided by its exponential.
+    pub lights: Lights,
     /// Whether it is a generated scene ([`veni_synth`]).
     pub generated: bool,
 }
@@ -30,7 +33,30 @@ impl Item {
     pub fn new(path: &Path, panorama: &Panorama, grid: Equirect) -> Self {
         let mut log_radiance = panorama.resample(grid).log().into_flattened();
         let log_exposure = centre_exposure(grid, &mut log_radiance);
-        Self { path: path.to_path_buf(), log_radiance: log_radiance.into(), log_exposure, generated: false }
+        Self {
+            path: path.to_path_buf(),
+            log_radiance: log_radiance.into(),
+            log_exposure,
+            lights: Lights::default(),
+            generated: false,
+        }
+    }
+
+    /// The same of what is left of the panorama without its compact lights, of which up to `lights` are taken out at its full
+    /// resolution.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the panorama holds a value that is not finite, or `lights` is more than
+    /// [`LightOptions::MOST`].
+    pub fn split(path: &Path, panorama: Panorama, grid: Equirect, lights: usize) -> Result<Self> {
+        if lights == 0 {
+            return Ok(Self::new(path, &panorama, grid));
+        }
+        let full = panorama.grid();
+        let light = LightOptions::of_codes(lights).of_pixels(full, panorama.into_pixels())?;
+        let lights = light.lights().clone();
+        let item = Self::new(path, &Panorama::new(full, light.into_residual()), grid);
+        Ok(Self { lights: lights.scaled((-item.log_exposure).exp()), ..item })
     }
 
     /// File name without extension.
@@ -87,7 +113,7 @@ impl Dataset {
         observer: &dyn Observer,
     ) -> Result<Self> {
         observer.begin("panorama", "loading", 0, files.len());
-        Ok(Self::new(grid, load(files, grid, options, |_, item| Ok(item), observer)?))
+        Ok(Self::new(grid, load(files, grid, 0, options, |_, item| Ok(item), observer)?))
     }
 
     /// Only the panoramas that are wanted.
@@ -128,18 +154,19 @@ impl Dataset {
 /// Most files that one error names.
 const MOST_NAMED: usize = 20;
 
-/// Reads files, in parallel; all that cannot be read are named together. Each panorama goes through `keep` with its place in the list, and advances the
+/// Reads files, in parallel, without up to `lights` compact lights of each; all that cannot be read are named together. Each panorama goes through `keep` with its place in the list, and advances the
 /// observer by one.
 pub(super) fn load(
     files: &[PathBuf],
     grid: Equirect,
+    lights: usize,
     options: &ReadOptions,
     keep: impl Fn(usize, Item) -> Result<Item> + Sync,
     observer: &dyn Observer,
 ) -> Result<Vec<Item>> {
     let read = parallel(files.len(), |at| {
         let claim = Budget::shared().claim_file(&files[at], options);
-        let item = match read_item(&files[at], grid, options, observer) {
+        let item = match read_item(&files[at], grid, lights, options, observer) {
             Ok(item) => Ok(keep(at, item)?),
             Err(error) => Err(error),
         };
@@ -157,7 +184,13 @@ pub(super) fn load(
     if errors.is_empty() { Ok(items) } else { Err(all_of(errors, files.len())) }
 }
 
-fn read_item(path: &Path, grid: Equirect, options: &ReadOptions, observer: &dyn Observer) -> Result<Item> {
+fn read_item(
+    path: &Path,
+    grid: Equirect,
+    lights: usize,
+    options: &ReadOptions,
+    observer: &dyn Observer,
+) -> Result<Item> {
     let mut panorama = Panorama::read_with(path, options)?;
     for note in panorama.notes() {
         observer.note(&format!("{}: {note}", path.display()));
@@ -171,7 +204,7 @@ fn read_item(path: &Path, grid: Equirect, options: &ReadOptions, observer: &dyn 
             bad.infinite
         ));
     }
-    Ok(Item::new(path, &panorama, grid))
+    Item::split(path, panorama, grid, lights).map_err(|e| e.in_file(path))
 }
 
 /// One error for all files that cannot be used, so that they can be put right at once.

@@ -87,6 +87,7 @@ mod tests {
             path: at.to_string().into(),
             log_radiance: (0..3 * grid.len()).map(|v| value(at, v)).collect(),
             log_exposure: 0.0,
+            lights: veni_light::light::Lights::default(),
             generated: false,
         };
         let set = Dataset::new(grid, (0..Reconstruction::PART + 6).map(item).collect());

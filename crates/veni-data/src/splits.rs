@@ -84,16 +84,18 @@ impl Splits {
     /// [`Error::Invalid`] without folders, without any training panorama, or if there is not the space for a large set;
     /// otherwise as [`Dataset::load`].
     pub fn open(config: &DataConfig, seed: u64) -> Result<Self> {
-        Self::open_observed(config, seed, &std::env::temp_dir(), &Silent)
+        Self::open_observed(config, seed, 0, &std::env::temp_dir(), &Silent)
     }
 
-    /// [`Splits::open`] with another folder where [`DataConfig::scratch`] is absent, and an observer of its progress.
+    /// [`Splits::open`] without up to `lights` compact lights of each panorama, with another folder where
+    /// [`DataConfig::scratch`] is absent, and an observer of its progress.
     ///
     /// # Errors
     /// As [`Splits::open`].
     pub fn open_observed(
         config: &DataConfig,
         seed: u64,
+        lights: usize,
         scratch: &Path,
         observer: &dyn Observer,
     ) -> Result<Self> {
@@ -163,11 +165,11 @@ impl Splits {
         let store = PixelStore::new(all, grid, config.memory_mib, scratch)?;
         observer.begin("panorama", "loading", 0, all);
         let options = ReadOptions { layer: config.layer.clone(), ..ReadOptions::default() };
-        let mut items = load(&files, grid, &options, |at, item| store.keep(at, item), observer)?;
+        let mut items = load(&files, grid, lights, &options, |at, item| store.keep(at, item), observer)?;
         items.extend(generated(
             config.synthetic,
             seed,
-            grid,
+            (grid, lights),
             |at, item| store.keep(files.len() + at, item),
             observer,
         )?);
@@ -192,18 +194,24 @@ fn captures_in_order(files: Vec<PathBuf>, seed: u64) -> Vec<Vec<PathBuf>> {
     order.into_iter().map(|at| std::mem::take(&mut groups[at])).collect()
 }
 
+/// The grid on which generated scenes are rendered if their lights are to be taken out.
+const SUN_GRID: Equirect = Equirect { width: 512, height: 256 };
+
 /// Scenes 0..`count` of the set with this seed, in order; each goes through `keep` with its number.
 fn generated(
     count: usize,
     seed: u64,
-    grid: Equirect,
+    (grid, lights): (Equirect, usize),
     keep: impl Fn(usize, Item) -> Result<Item> + Sync,
     observer: &dyn Observer,
 ) -> Result<Vec<Item>> {
     let make = |index: usize| {
-        let panorama = render(&Scene::draw(seed, index as u64, &Overrides::default()), grid);
+        // lights are found where a sun is a few pixels
+        let full = if lights > 0 { SUN_GRID } else { grid };
+        let panorama = render(&Scene::draw(seed, index as u64, &Overrides::default()), full);
         let path = format!("synth-{index:06}");
-        let item = Item { generated: true, ..Item::new(Path::new(&path), &panorama, grid) };
+        let item = Item::split(Path::new(&path), panorama, grid, lights)?;
+        let item = Item { generated: true, ..item };
         let item = keep(index, item)?;
         observer.advance(1);
         Ok(item)

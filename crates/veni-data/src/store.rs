@@ -109,6 +109,7 @@ mod tests {
             path: at.to_string().into(),
             log_radiance: (0..3 * GRID.len()).map(|v| (at * 3 * GRID.len() + v) as f32).collect(),
             log_exposure: at as f32,
+            lights: veni_light::light::Lights::default(),
             generated: false,
         }
     }

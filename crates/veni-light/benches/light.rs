@@ -4,9 +4,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use veni_light::latent::Latent;
-use veni_light::light::{
-    CompactLight, EnvironmentMap, Kind, Law, Levels, Light, Prefilter, RadiusSource, Sampler, Sh, Spectrum,
-};
+use veni_light::light::{CompactLight, EnvironmentMap, Law, Levels, Light, Prefilter, Sampler, Sh, Spectrum};
 use veni_light::model::Model;
 use veni_light::random::Stream;
 use veni_light::sphere::Equirect;
@@ -26,10 +24,7 @@ fn sky(grid: Equirect) -> Vec<[f32; 3]> {
         [([0.64, -0.48, 0.6], [12.0, 11.0, 9.0], 0.2665f32), ([-0.8, 0.36, 0.48], [0.8, 0.6, 0.3], 1.0)]
     {
         let radius = degrees.to_radians();
-        let (radius_source, kind) = (RadiusSource::Requested, Kind::of(radius));
-        let light =
-            CompactLight { direction, irradiance, radius, radius_source, kind, share: 0.0, clipped: false };
-        light.add_to(grid, &mut pixels);
+        CompactLight::new(direction, irradiance, radius).add_to(grid, &mut pixels);
     }
     pixels
 }

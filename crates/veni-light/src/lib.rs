@@ -42,6 +42,7 @@
 #![cfg_attr(not(feature = "training"), forbid(unsafe_code))]
 
 pub mod cholesky;
+mod compact;
 pub mod digest;
 pub mod error;
 pub mod field;

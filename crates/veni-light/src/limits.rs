@@ -19,6 +19,12 @@ pub const MAX_MODEL_HEADER_BYTES: u64 = 4 << 20;
 /// Bytes of a latent file; N = 4096 vectors take about 200 kB.
 pub const MAX_LATENT_BYTES: u64 = 16 << 20;
 
+/// Compact lights of a latent: eight are taken out of a panorama at most, and a scene between two has those of both.
+pub const MAX_LIGHTS: usize = 64;
+
+/// Lobes of a latent, each of which costs every direction about 0.2 % of the network.
+pub const MAX_LOBES: usize = 1024;
+
 /// Bytes of a file of settings (TOML). One with everything said has 4 kB.
 pub const MAX_SETTINGS_BYTES: u64 = 1 << 20;
 

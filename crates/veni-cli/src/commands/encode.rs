@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use clap::Args;
+use clap::{Args, value_parser};
 use serde_json::json;
 use veni_image::Panorama;
 use veni_image::Sheet;
@@ -48,6 +48,11 @@ pub(crate) struct Encode {
     #[command(flatten)]
     target: LatentFiles,
 
+    /// Take up to N compact lights (the sun, lamps) out of the panorama before it is encoded, and put them into the latent
+    /// [default: as many as the model was trained without]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8))]
+    lights: Option<u8>,
+
     /// Also write a PNG: panorama | reconstruction, one pair per row
     #[arg(long, value_name = "OUT.png")]
     preview: Option<PathBuf>,
@@ -70,7 +75,7 @@ impl Encode {
         let overwrite = Overwrite::from(self.force);
         let outputs = self.outputs(overwrite)?;
         let loaded = source::model(&self.model)?;
-        let encoding = Encoding::new(&loaded)?;
+        let encoding = Encoding::new(&loaded, self.lights.map(usize::from))?;
         let mut sheet =
             self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
         self.shard.note_idle(self.panoramas.len(), report);
@@ -145,8 +150,14 @@ fn print(path: &Path, output: Option<&PathBuf>, encoded: &Encoded, report: Repor
         Some(output) => {
             let (n, psnr) = (encoded.latent.vectors.len(), encoded.scores.ldr_psnr);
             let stops = encoded.latent.log_exposure / std::f32::consts::LN_2;
+            let lights = match (encoded.latent.lights.sun(), encoded.latent.lights.others().len()) {
+                (None, 0) => String::new(),
+                (Some(_), 0) => ", the sun".to_owned(),
+                (None, others) => format!(", {others} lights"),
+                (Some(_), others) => format!(", the sun and {others} lights"),
+            };
             let human = format!(
-                "{}: {n} vectors, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB",
+                "{}: {n} vectors{lights}, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB",
                 output.display()
             );
             report.result(human, &())

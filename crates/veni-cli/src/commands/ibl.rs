@@ -227,7 +227,7 @@ impl Ibl {
         match light.sun().filter(|_| self.sun == SunMode::Split) {
             Some(sun) => {
                 let rest = Panorama::new(panorama.grid(), light.residual().pixels().to_vec());
-                let sun = Some(sun.turned(angle as f32));
+                let sun = Some(sun.turned(angle));
                 Ok(Split { map: turned(rest), whole: Some(turned(panorama)), sun, up })
             }
             None => Ok(Split { map: turned(panorama), whole: None, sun: None, up }),

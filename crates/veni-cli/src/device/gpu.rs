@@ -10,10 +10,12 @@ use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::AdapterInfo;
 use veni_gpu::{GpuDecoder, GpuLatents};
 use veni_light::latent::Latent;
+use veni_light::light::Lights;
 use veni_light::model::Model;
 use veni_light::sphere::Frame;
 
 use super::directions::Directions;
+use super::on_cube::OnCube;
 use crate::args::DecodeDevice;
 use crate::output::Push;
 use crate::report::Report;
@@ -35,6 +37,8 @@ struct Inner {
 pub(crate) struct Conditioned {
     gpu: Arc<Inner>,
     latents: GpuLatents,
+    /// In units of radiance; added to the rows that the device gives.
+    lights: Lights,
 }
 
 /// All adapters, graphics cards first and software last.
@@ -105,8 +109,10 @@ impl Gpu {
     }
 
     pub(super) fn condition(&self, latent: &Latent) -> veni_gpu::Result<Conditioned> {
-        let latents = self.0.decoder.condition(&self.0.opened.queue, latent)?;
-        Ok(Conditioned { gpu: Arc::clone(&self.0), latents })
+        let vectors = Latent { lights: Lights::default(), ..latent.clone() };
+        let latents = self.0.decoder.condition(&self.0.opened.queue, &vectors)?;
+        let lights = latent.lights.scaled(latent.log_exposure.exp());
+        Ok(Conditioned { gpu: Arc::clone(&self.0), latents, lights })
     }
 }
 
@@ -115,14 +121,48 @@ impl Conditioned {
     pub(super) fn rows(&self, directions: Directions, each: Push<'_>) -> veni_light::Result<()> {
         let Inner { name, opened, decoder } = &*self.gpu;
         let picture = picture(directions);
-        let rows = read_back::bake_rows(decoder, &opened.queue, &self.latents, picture, |_, row| {
-            each(row).map_err(veni_gpu::Error::Core)
+        let mut lit = Lit::new(&self.lights, directions);
+        let rows = read_back::bake_rows(decoder, &opened.queue, &self.latents, picture, |at, row| {
+            each(lit.row(at, row)).map_err(veni_gpu::Error::Core)
         });
         rows.map_err(|error| match error {
             // what `each` said is not a fault of the device
             veni_gpu::Error::Core(error) => error,
             error => veni_light::Error::unsupported(format!("{name}: {error}; try --device cpu")),
         })
+    }
+}
+
+/// Rows with their lights.
+struct Lit<'a> {
+    lights: &'a Lights,
+    directions: Directions,
+    cube: Option<OnCube>,
+    row: Vec<[f32; 3]>,
+}
+
+impl<'a> Lit<'a> {
+    fn new(lights: &'a Lights, directions: Directions) -> Self {
+        let cube = match directions {
+            Directions::Cube { edge, frame } => Some(OnCube::new(lights, frame, edge)),
+            Directions::Equirect(_) => None,
+        };
+        Self { lights, directions, cube, row: Vec::new() }
+    }
+
+    /// The row that comes next, `at` from the top.
+    fn row<'r>(&'r mut self, at: usize, row: &'r [[f32; 3]]) -> &'r [[f32; 3]] {
+        if self.lights.is_empty() {
+            return row;
+        }
+        self.row.clear();
+        self.row.extend_from_slice(row);
+        match (self.directions, &mut self.cube) {
+            (_, Some(cube)) => cube.add_to(&mut self.row),
+            (Directions::Equirect(grid), None) => self.lights.add_to_rows(grid, at..at + 1, &mut self.row),
+            (Directions::Cube { .. }, None) => {}
+        }
+        &self.row
     }
 }
 

@@ -32,10 +32,13 @@ pub(crate) struct Encoded {
 pub(crate) struct Encoding<'a> {
     loaded: &'a Loaded,
     encoder: Encoder,
+    /// So many lights are taken out of a panorama, and put into its latent.
+    lights: usize,
 }
 
 impl<'a> Encoding<'a> {
-    pub(crate) fn new(loaded: &'a Loaded) -> Result<Self> {
+    /// With as many lights as the model's codes have, or as are asked for.
+    pub(crate) fn new(loaded: &'a Loaded, lights: Option<usize>) -> Result<Self> {
         if !loaded.model.has_encoder() {
             bail!(
                 "{}: this model has no encoder, it decodes only; name one that has with --model FILE",
@@ -43,30 +46,32 @@ impl<'a> Encoding<'a> {
             );
         }
         let encoder = Encoder::new(&loaded.model).map_err(|e| e.in_file(&loaded.name))?;
-        Ok(Self { loaded, encoder })
+        Ok(Self { loaded, encoder, lights: lights.unwrap_or(loaded.model.config().lights) })
     }
 
     /// Reads, encodes, and decodes again to compare.
     pub(crate) fn encode_file(&self, path: &Path, layer: &Layer, report: Report) -> Result<Encoded> {
         let panorama = panorama(path, layer, report)?;
         let grid = Equirect::new(GRID[0], GRID[1]);
-        let item = Item::new(path, &panorama, grid);
+        let item = Item::split(path, panorama.clone(), grid, self.lights).map_err(|e| e.in_file(path))?;
         let encoded =
             self.encoder.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
         let vectors = encoded.into_iter().next().map(|e| e.vectors).unwrap_or_default();
         let latent = Latent {
             vectors,
+            lights: item.lights,
             log_exposure: item.log_exposure,
             model: Some(self.loaded.model.hash()),
             source: Some(source_of(path)),
+            ..Latent::default()
         };
         let decoder = self.loaded.model.decoder().map_err(|e| e.in_file(&self.loaded.name))?;
         let field = decoder.condition(&latent).map_err(|e| e.in_file(path))?;
-        let mut decoded = vec![[0.0; 3]; grid.len()];
-        field.log_radiance_batch(&grid.directions(), &mut decoded);
-        let prediction: Vec<f32> = decoded.as_flattened().iter().map(|v| v - item.log_exposure).collect();
-        // the paper's protocol, as in training
-        let scores = scores(&prediction, &item.log_radiance, grid.height, grid.width, Alignment::LogFactor);
+        // the paper's protocol, as in training, on the panorama as a whole
+        let whole = Item::new(path, &panorama, grid);
+        let decoded = Panorama::new(grid, field.bake(grid)).log();
+        let prediction: Vec<f32> = decoded.as_flattened().iter().map(|v| v - whole.log_exposure).collect();
+        let scores = scores(&prediction, &whole.log_radiance, grid.height, grid.width, Alignment::LogFactor);
         Ok(Encoded { latent, scores, panorama, field })
     }
 }

@@ -111,6 +111,7 @@ mod tests {
             path: index.to_string().into(),
             log_radiance: vec![0.0; 6].into(),
             log_exposure: 0.0,
+            lights: veni_light::light::Lights::default(),
             generated: index >= 5,
         };
         let mut config = Preset::Tiny.config(3);

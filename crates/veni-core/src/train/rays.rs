@@ -103,6 +103,7 @@ mod tests {
             path: format!("{k}.exr").into(),
             log_radiance: (0..grid.len()).flat_map(|p| [p as f32, 0.0, k as f32]).collect(),
             log_exposure: 0.0,
+            lights: veni_light::light::Lights::default(),
             generated: false,
         };
         let train = Dataset::new(grid, (0..3).map(item).collect());

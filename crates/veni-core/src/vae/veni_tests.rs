@@ -11,7 +11,7 @@ use super::Veni;
 use veni_data::augment::{mirror, turn_columns};
 use veni_data::{Dataset, panorama_files};
 use veni_light::latent::Latent;
-use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
+use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig};
 use veni_light::sphere::Equirect;
 
 const STRIPES: usize = 32;
@@ -34,10 +34,9 @@ impl Setup {
             ..EncoderConfig::default()
         };
         let config = ModelConfig {
-            kind: ModelKind::Veni,
-            latent_vectors: 9,
             decoder: DecoderConfig { hidden: 32, layers: 2, ..DecoderConfig::default() },
             encoder: Some(encoder),
+            ..ModelConfig::decode_only(9)
         };
         let veni = Veni::new(&config, &mut Stream::from_seed(5), &Device::flex()).unwrap();
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/panoramas/val");

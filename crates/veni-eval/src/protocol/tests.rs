@@ -326,9 +326,8 @@ fn identities_see_the_encoder_too() {
     );
     let config = ModelConfig {
         kind: ModelKind::Reni,
-        latent_vectors: 3,
         decoder: DecoderConfig { hidden: 16, layers: 2, heads: 2, ..DecoderConfig::default() },
-        encoder: None::<EncoderConfig>,
+        ..ModelConfig::decode_only(3)
     };
     let reni = LoadedModel::new("reni", Model::filler(&config, 3).unwrap(), &Device::flex()).unwrap();
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ use veni_light::model::{
 /// The encoder's configuration beside the smallest decoder.
 pub(crate) fn config(encoder: EncoderConfig, latent_vectors: usize) -> ModelConfig {
     let decoder = DecoderConfig { hidden: 8, layers: 1, heads: 1, ..DecoderConfig::default() };
-    ModelConfig { kind: ModelKind::Veni, latent_vectors, decoder, encoder: Some(encoder) }
+    ModelConfig { kind: ModelKind::Veni, latent_vectors, decoder, encoder: Some(encoder), lights: 0 }
 }
 
 /// Numbers between −1 and 1 that a seed fixes.

@@ -5,9 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 use veni_image::{Panorama, Picture};
-use veni_light::light::{
-    CompactLight, CubeAxes, CubeMap, Dfg, Kind, Law, Levels, Light, Prefilter, RadiusSource,
-};
+use veni_light::light::{CompactLight, CubeAxes, CubeMap, Dfg, Law, Levels, Light, Prefilter};
 use veni_light::sphere::{Equirect, Frame};
 
 use super::Result;
@@ -78,15 +76,7 @@ impl Sky {
         let mut sky = Panorama::from_fn(Equirect::new(1024, 512), |[.., z]| {
             if z < 0.0 { [0.12, 0.1, 0.08] } else { [0.5, 0.7 + 0.2 * z, 1.0 + 0.4 * z] }
         });
-        let sun = CompactLight {
-            direction: [0.48, -0.6, 0.64],
-            irradiance: [6.0, 5.0, 4.0],
-            radius: CompactLight::SUN_RADIUS,
-            radius_source: RadiusSource::Assumed,
-            kind: Kind::Disc,
-            share: 0.5,
-            clipped: false,
-        };
+        let sun = CompactLight::new([0.48, -0.6, 0.64], [6.0, 5.0, 4.0], CompactLight::SUN_RADIUS);
         sun.add_to(sky.grid(), sky.pixels_mut());
         Self::of(&sky)
     }

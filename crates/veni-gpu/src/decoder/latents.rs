@@ -106,6 +106,13 @@ impl GpuDecoder {
     fn fold(&self, latents: &[Latent]) -> Result<Vec<f32>> {
         let mut data = Vec::with_capacity(4 * self.sizes.latent_stride() * latents.len());
         for latent in latents {
+            if !(latent.lights.is_empty() && latent.lobes.is_empty()) {
+                return Err(Error::unsupported(
+                    "the shaders decode the vectors of a code, not its lights and lobes: draw its lights as your own \
+                     (Field::lights), and take them out of the latent first"
+                        .to_owned(),
+                ));
+            }
             pack_latent(self.sizes, &self.decoder.condition(latent)?, &mut data);
         }
         Ok(data)

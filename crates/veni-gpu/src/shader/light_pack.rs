@@ -50,7 +50,7 @@ pub fn pack_light(light: &Light, density: LightDensity) -> Result<PackedLight> {
     let edges = edges(grid);
     let cells: Vec<_> = sampler.table().map(|(keep, other)| [keep.to_bits(), other]).collect();
     let first = split.as_ref().map(|split| *split.sun());
-    let rest = &light.lights()[usize::from(first.is_some())..];
+    let rest = light.lights().others();
     let lights: Vec<_> = first.iter().chain(rest).take(MAX_LIGHTS).map(disc).collect();
     let half = 0.5 * PI / grid.height as f64;
     let uniform = LightUniform {

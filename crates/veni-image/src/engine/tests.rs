@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use veni_light::light::{EnvironmentMap, Kind, RadiusSource};
+use veni_light::light::EnvironmentMap;
 use veni_light::progress::Silent;
 use veni_light::sphere::{CubeFace, Equirect};
 
@@ -20,15 +20,7 @@ fn panorama() -> Panorama {
 }
 
 fn sun() -> CompactLight {
-    CompactLight {
-        direction: [0.48, 0.64, 0.6],
-        irradiance: [6.0, 5.0, 4.0],
-        radius: CompactLight::SUN_RADIUS,
-        radius_source: RadiusSource::Assumed,
-        kind: Kind::Disc,
-        share: 0.5,
-        clipped: false,
-    }
+    CompactLight::new([0.48, 0.64, 0.6], [6.0, 5.0, 4.0], CompactLight::SUN_RADIUS)
 }
 
 /// Writes a folder and hands it to a check.

@@ -17,14 +17,14 @@ pub(super) const TASK: usize = 192;
 const BAND: usize = 1 << 18;
 
 impl Field {
-    /// Linear RGB radiance from unit direction `direction`.
+    /// Linear RGB radiance from unit direction `direction`, lights included.
     pub fn radiance(&self, direction: [f32; 3]) -> [f32; 3] {
         let mut out = [[0.0; 3]];
         self.run(&[direction], &mut out, false, &mut Aligned::default());
         out[0]
     }
 
-    /// Natural log of [`Field::radiance`], the network's own output.
+    /// Natural log of [`Field::radiance`] without the lights.
     pub fn log_radiance(&self, direction: [f32; 3]) -> [f32; 3] {
         let mut out = [[0.0; 3]];
         self.run(&[direction], &mut out, true, &mut Aligned::default());
@@ -39,7 +39,7 @@ impl Field {
         self.batch(directions, out, false);
     }
 
-    /// Natural log of [`Field::radiance_batch`].
+    /// Natural log of [`Field::radiance_batch`] without the lights.
     ///
     /// # Panics
     /// If `out` is not as long as `directions`.
@@ -66,13 +66,25 @@ impl Field {
         log: bool,
         scratch: &mut Aligned,
     ) {
+        self.run_with(directions, out, log, true, scratch);
+    }
+
+    fn run_with(
+        &self,
+        directions: &[[f32; 3]],
+        out: &mut [[f32; 3]],
+        log: bool,
+        caps: bool,
+        scratch: &mut Aligned,
+    ) {
         let (mlp, folded, arch) = (&self.weights.mlp, &*self.folded, pulp::Arch::new());
         let few = directions.len() <= FEW;
-        let work = Blocks { mlp, folded, directions, out, log, scratch };
+        let work = Blocks { mlp, folded, directions, out, log, caps, scratch };
         if few { arch.dispatch(Single(work)) } else { arch.dispatch(work) }
     }
 
-    /// Linear RGB radiance of every pixel centre of `grid`, row-major from the top, on all cores.
+    /// Linear RGB radiance of every pixel centre of `grid`, row-major from the top, on all cores; of the lights the mean over the
+    /// pixel, so that their energy is right at any resolution.
     pub fn bake(&self, grid: Equirect) -> Vec<[f32; 3]> {
         let mut pixels = vec![[0.0; 3]; grid.len()];
         self.bake_band(grid, &Columns::new(grid), 0, &mut pixels);
@@ -110,8 +122,9 @@ impl Field {
         tasks::each(parts, workspace, |(scratch, directions), (task, out)| {
             directions.clear();
             columns.directions(grid, first * grid.width + task * TASK, out.len(), directions);
-            self.run(directions, out, false, scratch);
+            self.run_with(directions, out, false, false, scratch);
         });
+        self.folded.lights.add_to_rows(grid, first..first + pixels.len() / grid.width, pixels);
     }
 }
 

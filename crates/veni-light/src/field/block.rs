@@ -9,7 +9,7 @@ use pulp::{Simd, WithSimd};
 
 use super::aligned::Aligned;
 use super::mlp::{Matrix, Mlp, PANEL};
-use super::{Folded, math};
+use super::{Folded, lobes, math};
 
 /// Vectors per row.
 pub(super) const VECTORS: usize = 3;
@@ -30,6 +30,8 @@ pub(super) struct Blocks<'a> {
     pub(super) out: &'a mut [[f32; 3]],
     /// Log radiance instead of radiance.
     pub(super) log: bool,
+    /// Whether radiance includes the lights.
+    pub(super) caps: bool,
     pub(super) scratch: &'a mut Aligned,
 }
 
@@ -38,7 +40,7 @@ impl WithSimd for Blocks<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { mlp, folded, directions, out, log, scratch } = self;
+        let Self { mlp, folded, directions, out, log, caps, scratch } = self;
         let row = VECTORS * S::F32_LANES;
         let (hidden, widest) = (mlp.padded(), mlp.input.iter().map(|c| c.weight.inputs).max().unwrap_or(0));
         let scratch = scratch.at_least(row * (4 + hidden + hidden.max(widest) + PANEL));
@@ -50,6 +52,7 @@ impl WithSimd for Blocks<'_> {
         for (directions, out) in directions.chunks(row).zip(out.chunks_mut(row)) {
             scatter(simd, directions, direction);
             network(simd, mlp, folded, direction, x, y, rgb);
+            lobes::add(simd, &folded.lobes, direction, &mut rgb[..3]);
             let offset = simd.splat_f32s(folded.log_exposure);
             for value in rgb[..3].as_flattened_mut() {
                 *value = simd.add_f32s(*value, offset);
@@ -60,6 +63,10 @@ impl WithSimd for Blocks<'_> {
             let rgb: &[f32] = bytemuck::cast_slice(rgb);
             for (i, out) in out.iter_mut().enumerate() {
                 *out = [rgb[i], rgb[row + i], rgb[2 * row + i]];
+            }
+            if !log && caps {
+                let both = directions.iter().zip(out.iter_mut());
+                both.for_each(|(d, out)| folded.caps.iter().for_each(|cap| cap.add(*d, out)));
             }
         }
     }

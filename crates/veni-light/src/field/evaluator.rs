@@ -42,7 +42,7 @@ impl Evaluator {
         out[0]
     }
 
-    /// Natural log of [`Evaluator::radiance`], the network's own output.
+    /// Natural log of [`Evaluator::radiance`] without the lights.
     pub fn log_radiance(&mut self, direction: [f32; 3]) -> [f32; 3] {
         let mut out = [[0.0; 3]];
         self.field.run(&[direction], &mut out, true, &mut self.scratch);

@@ -6,10 +6,12 @@
 //! 1. inputs pᵢ = zᵢ,x dx + zᵢ,y dy for the N vectors, d_z and √(dx² + dy²);
 //! 2. their sines and cosines at frequencies 1 and 4 and themselves, projected to h = 128 features x;
 //! 3. per layer x ← LN(x + a), x ← LN(x + W₂ max(0, W₁ x + b₁) + b₂), where a depends on the latent only;
-//! 4. log radiance = W x + b + the latent's log exposure.
+//! 4. log radiance = W x + b + the latent's lobes + its log exposure;
+//! 5. radiance = exp(log radiance) + the radiance of the latent's lights whose disc d is in.
 //!
-//! All entry points give the same bits for the same direction: one direction, a batch, a baked panorama. The
-//! kernels run at the widest SIMD the processor has.
+//! All entry points give the same bits for the same direction: one direction, a batch, a baked panorama; but for the lights, of
+//! which a pixel holds the exact part that lies in it. Functions of log radiance leave the lights out. The kernels run at the
+//! widest SIMD the processor has.
 
 mod aligned;
 mod bake;
@@ -22,6 +24,8 @@ mod block;
 mod condition;
 mod evaluator;
 pub(crate) mod gradient;
+mod lights;
+mod lobes;
 mod math;
 mod mlp;
 mod rate;
@@ -30,9 +34,11 @@ mod weights;
 
 use std::sync::Arc;
 
-use crate::latent::Latent;
+use crate::compact::Lights;
+use crate::latent::{Latent, Lobe};
 use crate::model::Model;
 use crate::{Error, Result};
+use lights::Cap;
 use weights::Weights;
 
 #[cfg(feature = "training")]
@@ -70,11 +76,16 @@ struct Folded {
     no_bias: Vec<f32>,
     /// Per layer: β of its second norm plus the next layer's attention.
     shift: Vec<Vec<f32>>,
+    lobes: Vec<Lobe>,
+    /// In units of radiance: exposure included.
+    lights: Lights,
+    /// The lights as what a direction meets.
+    caps: Vec<Cap>,
     log_exposure: f32,
 }
 
-/// A conditioned latent as plain numbers, for evaluators other than this module: a shader, for instance. h is the
-/// decoder's hidden size; the vectors may be longer, padded with zeros.
+/// A conditioned latent as plain numbers, for evaluators other than this module: a shader, for instance. Its lights are
+/// [`Field::lights`]. h is the decoder's hidden size; the vectors may be longer, padded with zeros.
 #[derive(Clone, Copy, Debug)]
 pub struct FoldedLatent<'a> {
     /// x and y of the N latent vectors.
@@ -83,6 +94,8 @@ pub struct FoldedLatent<'a> {
     pub input_bias: &'a [f32],
     /// For every layer β of its second norm plus the next layer's attention.
     pub shifts: &'a [Vec<f32>],
+    /// Added to the network's output.
+    pub lobes: &'a [Lobe],
     /// Added to the network's output.
     pub log_exposure: f32,
 }
@@ -138,7 +151,11 @@ impl Decoder {
             Some(attention) => plus(&layer.beta2, attention),
             None => layer.beta2.clone(),
         });
+        let lights = latent.lights.scaled(latent.log_exposure.exp());
         let folded = Folded {
+            lobes: latent.lobes.clone(),
+            caps: caps(&lights),
+            lights,
             vectors: latent.vectors.iter().map(|[x, y, _]| [*x, *y]).collect(),
             no_bias: vec![0.0; weights.mlp.padded()],
             input_bias,
@@ -152,8 +169,8 @@ impl Decoder {
 impl Field {
     /// What conditioning left of the latent.
     pub fn folded(&self) -> FoldedLatent<'_> {
-        let Folded { vectors, input_bias, shift, log_exposure, .. } = &*self.folded;
-        FoldedLatent { vectors, input_bias, shifts: shift, log_exposure: *log_exposure }
+        let Folded { vectors, input_bias, shift, lobes, log_exposure, .. } = &*self.folded;
+        FoldedLatent { vectors, input_bias, shifts: shift, lobes, log_exposure: *log_exposure }
     }
 
     /// The same scene turned by `radians` about z, counter-clockwise seen from above. Exact: it turns the latent,
@@ -167,6 +184,8 @@ impl Field {
         };
         let mut folded = Folded::clone(&self.folded);
         folded.vectors = folded.vectors.iter().map(turn).collect();
+        folded.lobes = folded.lobes.iter().map(|lobe| lobe.turned(radians)).collect();
+        folded.set_lights(folded.lights.turned(radians));
         Self { weights: Arc::clone(&self.weights), folded: Arc::new(folded) }
     }
 
@@ -175,8 +194,28 @@ impl Field {
     pub fn brightened(&self, stops: f32) -> Self {
         let mut folded = Folded::clone(&self.folded);
         folded.log_exposure += stops * std::f32::consts::LN_2;
+        folded.set_lights(folded.lights.scaled(stops.exp2()));
         Self { weights: Arc::clone(&self.weights), folded: Arc::new(folded) }
     }
+
+    /// The same field with these lights instead of its own, in units of radiance.
+    #[must_use]
+    pub fn with_lights(&self, lights: Lights) -> Self {
+        let mut folded = Folded::clone(&self.folded);
+        folded.set_lights(lights);
+        Self { weights: Arc::clone(&self.weights), folded: Arc::new(folded) }
+    }
+}
+
+impl Folded {
+    fn set_lights(&mut self, lights: Lights) {
+        self.caps = caps(&lights);
+        self.lights = lights;
+    }
+}
+
+fn caps(lights: &Lights) -> Vec<Cap> {
+    lights.iter().filter_map(Cap::new).collect()
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::block::{Blocks, EPSILON, PARTIAL, inner_product};
+use super::lobes::{self, first};
 use super::mlp::{Matrix, Mlp, PANEL};
 use super::{Folded, math};
 
@@ -20,7 +21,7 @@ impl WithSimd for Single<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self(Blocks { mlp, folded, directions, out, log, scratch }) = self;
+        let Self(Blocks { mlp, folded, directions, out, log, caps, scratch }) = self;
         let (inputs, padded) = (5 * (folded.vectors.len() + 2), mlp.padded());
         let all = &mut scratch.at_least(inputs + 2 * padded)[..inputs + 2 * padded];
         // what is padding must be 0
@@ -29,18 +30,17 @@ impl WithSimd for Single<'_> {
         let (x, y) = rest.split_at_mut(padded);
         for (direction, out) in directions.iter().zip(out) {
             encode(simd, folded, *direction, features);
-            let rgb = network::<S>(mlp, folded, features, x, y);
+            let mut rgb = network::<S>(mlp, folded, features, x, y);
+            lobes::add_one(simd, &folded.lobes, *direction, &mut rgb);
             *out = rgb.map(|value| {
                 let value = value + folded.log_exposure;
                 if log { value } else { first(math::exp(simd, simd.splat_f32s(value))) }
             });
+            if !log && caps {
+                folded.caps.iter().for_each(|cap| cap.add(*direction, out));
+            }
         }
     }
-}
-
-#[inline(always)]
-fn first<V: pulp::bytemuck::Pod>(vector: V) -> f32 {
-    bytemuck::cast_slice::<V, f32>(&[vector])[0]
 }
 
 /// Five features of each directional input, as in `block`, a lane per input.

@@ -1,21 +1,27 @@
-//! The latent file: JSON `{format, model, n, vectors, exposure, source}`.
+//! The latent file: JSON `{format, model, n, vectors, sun, lights, lobes, exposure, source}`.
 //!
-//! `vectors` is N triples [x, y, z]; `exposure` the natural log of the factor to radiance; `model` and `source`
-//! may be null or absent. The same text goes into the attribute of a baked panorama.
+//! `vectors` is N triples [x, y, z]; `exposure` the natural log of the factor to radiance; `sun` and each of `lights` (which are not
+//! the sun) `{direction, irradiance, radius}`, radians, before the exposure; each of `lobes` `{direction, amplitude, sharpness}`.
+//! All but the format, n, vectors and exposure may be null or absent. Without lights and lobes the format is 1, which older programs
+//! read too; with them it is 2. The same text goes into the attribute of a baked panorama.
 
 use std::io::Write;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::Latent;
+use super::{Latent, Lobe};
+use crate::compact::{CompactLight, Lights, RadiusSource};
 use crate::limits::read_text;
 use crate::output::{Overwrite, write_atomic};
 use crate::{Error, Result};
 
 pub use crate::limits::MAX_LATENT_BYTES;
 
-const FORMAT: u32 = 1;
+/// Of a code of vectors alone.
+const PLAIN: u32 = 1;
+/// Of a code with lights or lobes.
+const FORMAT: u32 = 2;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -25,9 +31,80 @@ struct Text {
     model: Option<String>,
     n: usize,
     vectors: Vec<[f32; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    sun: Option<LightText>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    lights: Vec<LightText>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    lobes: Vec<LobeText>,
     exposure: f32,
     #[serde(default)]
     source: Option<String>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LightText {
+    direction: [f32; 3],
+    irradiance: [f32; 3],
+    radius: f32,
+    #[serde(default)]
+    radius_source: SourceText,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    clipped: bool,
+}
+
+#[derive(Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum SourceText {
+    Measured,
+    Assumed,
+    #[default]
+    Requested,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LobeText {
+    direction: [f32; 3],
+    amplitude: [f32; 3],
+    sharpness: f32,
+}
+
+impl From<&CompactLight> for LightText {
+    fn from(light: &CompactLight) -> Self {
+        let CompactLight { direction, irradiance, radius, radius_source, clipped } = *light;
+        let radius_source = match radius_source {
+            RadiusSource::Measured => SourceText::Measured,
+            RadiusSource::Assumed => SourceText::Assumed,
+            RadiusSource::Requested => SourceText::Requested,
+        };
+        Self { direction, irradiance, radius, radius_source, clipped }
+    }
+}
+
+impl From<LightText> for CompactLight {
+    fn from(text: LightText) -> Self {
+        let LightText { direction, irradiance, radius, radius_source, clipped } = text;
+        let radius_source = match radius_source {
+            SourceText::Measured => RadiusSource::Measured,
+            SourceText::Assumed => RadiusSource::Assumed,
+            SourceText::Requested => RadiusSource::Requested,
+        };
+        Self { direction, irradiance, radius, radius_source, clipped }
+    }
+}
+
+impl From<&Lobe> for LobeText {
+    fn from(&Lobe { direction, amplitude, sharpness }: &Lobe) -> Self {
+        Self { direction, amplitude, sharpness }
+    }
+}
+
+impl From<LobeText> for Lobe {
+    fn from(LobeText { direction, amplitude, sharpness }: LobeText) -> Self {
+        Self { direction, amplitude, sharpness }
+    }
 }
 
 #[derive(Deserialize)]
@@ -42,11 +119,15 @@ impl Latent {
     /// [`Error::Invalid`] if a number is not finite.
     pub fn to_json(&self) -> Result<String> {
         self.check_finite()?;
+        let plain = self.lights.is_empty() && self.lobes.is_empty();
         let text = Text {
-            format: FORMAT,
+            format: if plain { PLAIN } else { FORMAT },
             model: self.model.clone(),
             n: self.vectors.len(),
             vectors: self.vectors.clone(),
+            sun: self.lights.sun().map(LightText::from),
+            lights: self.lights.others().iter().map(LightText::from).collect(),
+            lobes: self.lobes.iter().map(LobeText::from).collect(),
             exposure: self.log_exposure,
             source: self.source.clone(),
         };
@@ -61,9 +142,9 @@ impl Latent {
     pub fn from_json(json: &str) -> Result<Self> {
         let broken = |e: serde_json::Error| Error::invalid(format!("not a latent ({e})"));
         let Format { format } = serde_json::from_str(json).map_err(broken)?;
-        if format != FORMAT {
+        if ![PLAIN, FORMAT].contains(&format) {
             return Err(Error::unsupported(format!(
-                "latent format {format} is unknown (this program reads format {FORMAT})"
+                "latent format {format} is unknown (this program reads formats {PLAIN} and {FORMAT})"
             )));
         }
         let text: Text = serde_json::from_str(json).map_err(broken)?;
@@ -73,8 +154,10 @@ impl Latent {
                 "a latent of n = {n} must have {n} vectors, this has {count}"
             )));
         }
-        let Text { model, vectors, exposure, source, .. } = text;
-        let latent = Self { vectors, log_exposure: exposure, model, source };
+        let Text { model, vectors, sun, lights, lobes, exposure, source, .. } = text;
+        let lights = Lights::new(sun.map(CompactLight::from), lights.into_iter().map(CompactLight::from));
+        let lobes = lobes.into_iter().map(Lobe::from).collect();
+        let latent = Self { vectors, lights, lobes, log_exposure: exposure, model, source };
         latent.check_finite()?;
         Ok(latent)
     }
@@ -118,6 +201,15 @@ mod tests {
             latent.vectors[0] = [f32::MIN_POSITIVE, -0.0, f32::MAX];
             latent.vectors[1] = [1e-45, 1.0 / 3.0, -16_777_217.0];
             (latent.log_exposure, latent.model) = (-7.3, Some("0123456789abcdef".into()));
+            assert!(latent.to_json().unwrap().contains("\"format\":1"));
+            if seed % 2 == 1 {
+                let lamp = CompactLight::new([0.0, -0.6, 0.8], [1.0 / 3.0, 0.1, 1e-7], 0.01);
+                let sun = CompactLight { radius_source: RadiusSource::Assumed, clipped: true, ..lamp };
+                latent.lights = Lights::new((seed % 4 == 1).then_some(sun), [lamp]);
+                latent.lobes =
+                    vec![Lobe { direction: [1.0, 0.0, 0.0], amplitude: [0.3, -0.1, 2.0], sharpness: 33.3 }];
+                assert!(latent.to_json().unwrap().contains("\"format\":2"));
+            }
             latent.save(&path, Overwrite::Replace).unwrap();
             let back = Latent::load(&path).unwrap();
             let bits = |l: &Latent| l.vectors.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
@@ -138,7 +230,7 @@ mod tests {
             Latent::from_json(&text).unwrap_err()
         };
         assert!(
-            matches!(reason("\"format\":1", "\"format\":2"), Error::Unsupported(m) if m.contains("format 2"))
+            matches!(reason("\"format\":1", "\"format\":3"), Error::Unsupported(m) if m.contains("format 3"))
         );
         for (from, to, says) in [
             ("\"n\":1", "\"n\":2", "n = 2"),

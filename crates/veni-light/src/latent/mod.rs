@@ -1,23 +1,33 @@
-//! The latent code: N vectors in R³ that turn with the scene, and an exposure. MODEL (2).
+//! The latent code: N vectors in R³ that turn with the scene, its compact lights, and an exposure. MODEL (2), (37).
 //!
-//! Turning a panorama by α about z turns every vector by α about z; the x and y of a vector form its
-//! equivariant part, z its invariant part. The paper's dimension is D = 3N.
+//! Turning a panorama by α about z turns every vector, light and lobe by α about z; the x and y of a vector form its equivariant
+//! part, z its invariant part. The paper's code is the vectors alone, of dimension D = 3N; a light and a lobe take seven numbers
+//! each.
 
 mod density;
 mod file;
+mod lobe;
 mod prior;
 
 pub use file::MAX_LATENT_BYTES;
+pub use lobe::Lobe;
 pub use prior::Prior;
 
+use crate::compact::Lights;
 use crate::random::Stream;
 use crate::{Error, Result};
 
-/// A code for one panorama, in the native frame (z up).
+/// A code for one panorama, in the native frame (z up):
+/// L(d) = e^s (exp(f(d; Z) + Σ lobes) + Σ lights), with the log exposure s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Latent {
     /// The N vectors [x, y, z].
     pub vectors: Vec<[f32; 3]>,
+    /// The sun and other compact lights, which the vectors say nothing about. Their irradiance is that of the decoder's output:
+    /// before the exposure.
+    pub lights: Lights,
+    /// Spherical Gaussians of log radiance, added to the network's output.
+    pub lobes: Vec<Lobe>,
     /// Natural log of the factor between the decoder's output and radiance; added to log radiance. 0 leaves it.
     pub log_exposure: f32,
     /// Identity of the decoder it was made for ([`Model::hash`](crate::model::Model::hash)), if known.
@@ -30,6 +40,11 @@ impl Latent {
     /// A code at exposure 0, of unknown origin.
     pub fn new(vectors: Vec<[f32; 3]>) -> Self {
         Self { vectors, ..Self::default() }
+    }
+
+    /// D = 3N + 7M + 7K: coordinates of the N vectors, the M lights and the K lobes.
+    pub fn dimension(&self) -> usize {
+        3 * self.vectors.len() + 7 * (self.lights.len() + self.lobes.len())
     }
 
     /// A random code: vectors and exposure drawn from `prior`. The same generator state gives the same bits
@@ -48,23 +63,31 @@ impl Latent {
     #[must_use]
     pub fn turned(&self, radians: f64) -> Self {
         let (sin, cos) = radians.sin_cos();
-        self.map(|[x, y, z]| {
+        let turn = |[x, y, z]: [f32; 3]| {
             let (x, y) = (f64::from(x), f64::from(y));
             [(x * cos - y * sin) as f32, (x * sin + y * cos) as f32, z]
-        })
+        };
+        Self {
+            vectors: self.vectors.iter().copied().map(turn).collect(),
+            lights: self.lights.turned(radians),
+            lobes: self.lobes.iter().map(|lobe| lobe.turned(radians)).collect(),
+            ..self.clone()
+        }
     }
 
     /// The code of the mirrored scene: azimuth φ becomes −φ, the columns of a panorama reversed.
     #[must_use]
     pub fn mirrored(&self) -> Self {
-        self.map(|[x, y, z]| [x, -y, z])
+        Self {
+            vectors: self.vectors.iter().map(|[x, y, z]| [*x, -y, *z]).collect(),
+            lights: self.lights.mirrored(),
+            lobes: self.lobes.iter().map(|lobe| lobe.mirrored()).collect(),
+            ..self.clone()
+        }
     }
 
-    fn map(&self, change: impl Fn([f32; 3]) -> [f32; 3]) -> Self {
-        Self { vectors: self.vectors.iter().copied().map(change).collect(), ..self.clone() }
-    }
-
-    /// (1 − t)·self + t·other, vector by vector, exposure too: the paper's interpolation.
+    /// (1 − t)·self + t·other, vector by vector, exposure too: the paper's interpolation. Lights move along the sphere and fade
+    /// where only one of the two has them ([`Lights::between`]); the lobes of one fade as those of the other come.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the codes have different N or belong to different models.
@@ -109,16 +132,19 @@ impl Latent {
         let pairs = self.vectors.iter().zip(&other.vectors);
         Ok(Self {
             vectors: pairs.map(|(p, q)| std::array::from_fn(|k| a * p[k] + b * q[k])).collect(),
+            lights: self.lights.between(&other.lights, t),
+            lobes: fading(&self.lobes, 1.0 - t).chain(fading(&other.lobes, t)).collect(),
             log_exposure: (1.0 - t) * self.log_exposure + t * other.log_exposure,
             model: self.model.clone().or_else(|| other.model.clone()),
             source: None,
         })
     }
 
-    /// Refuses a NaN or an infinity.
+    /// Refuses a NaN or an infinity, and lights and lobes that are none.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the first vector or exposure that is not finite.
+    /// [`Error::Invalid`] naming the first vector, light, lobe or exposure that is not finite; [`Error::TooLarge`] for more lights or
+    /// lobes than [`limits`](crate::limits) allow.
     pub fn check_finite(&self) -> Result<()> {
         if let Some(i) = self.vectors.iter().position(|v| v.iter().any(|c| !c.is_finite())) {
             return Err(Error::invalid(format!("latent vector {i} is {:?}, not finite", self.vectors[i])));
@@ -129,8 +155,14 @@ impl Latent {
                 self.log_exposure
             )));
         }
-        Ok(())
+        self.lights.check()?;
+        Lobe::check(&self.lobes)
     }
+}
+
+/// Lobes `factor` times as high; none of height 0.
+fn fading(lobes: &[Lobe], factor: f32) -> impl Iterator<Item = Lobe> {
+    lobes.iter().filter(move |_| factor != 0.0).map(move |lobe| lobe.scaled(factor))
 }
 
 #[cfg(test)]

@@ -1,9 +1,12 @@
 //! A map split into its compact lights and the rest.
 
-use super::compact::{CompactLight, Kind, RadiusSource};
 use super::environment::EnvironmentMap;
 use super::extract::{Criteria, Extracted, Extraction, Level, SunChoice};
+use super::luminance::luminance;
 use super::sh::Sh;
+use std::f32::consts::PI;
+
+use crate::compact::{CompactLight, Kind, Lights, RadiusSource};
 use crate::field::Field;
 use crate::sphere::Equirect;
 use crate::{Error, Result};
@@ -30,8 +33,8 @@ pub struct Light {
     pub(super) residual: Vec<[f32; 3]>,
     /// The residual before any turn, at about 256 columns.
     coarse: Level,
-    pub(super) lights: Vec<CompactLight>,
-    has_sun: bool,
+    pub(super) lights: Lights,
+    shares: Vec<f32>,
     pub(super) harmonics: Sh<2>,
     /// How far this was turned, radians.
     pub(super) angle: f64,
@@ -42,6 +45,8 @@ pub struct Light {
 pub struct LightOptions {
     /// So many lights are kept at most, the sun first; up to eight. Whether there is a sun, and what it is, does not depend on it.
     pub lights: usize,
+    /// Lights of a larger angular radius, radians, stay in the map.
+    pub widest: f32,
     /// A light's least share of the light on a surface that faces it.
     pub share: f32,
     /// A light's peak is so many times brighter than what surrounds it.
@@ -54,13 +59,25 @@ pub struct LightOptions {
 
 impl Default for LightOptions {
     fn default() -> Self {
-        Self { lights: Self::MOST, share: 0.02, contrast: 5.0, sun: SunChoice::Auto, sun_radius: None }
+        Self {
+            lights: Self::MOST,
+            widest: PI,
+            share: 0.02,
+            contrast: 5.0,
+            sun: SunChoice::Auto,
+            sun_radius: None,
+        }
     }
 }
 
 impl LightOptions {
     /// The most lights that are taken out; so many are always looked for.
-    pub const MOST: usize = 8;
+    pub const MOST: usize = Lights::MOST;
+
+    /// What a latent has beside its vectors: up to `lights` of at most 6°. The field describes what is wider.
+    pub fn of_codes(lights: usize) -> Self {
+        Self { lights, widest: Kind::GLOW.to_radians(), ..Self::default() }
+    }
 
     /// The light of row-major `pixels`, which become the residual: no copy is made.
     ///
@@ -87,6 +104,12 @@ impl LightOptions {
                 "at most {} lights are taken out, not {}",
                 Self::MOST,
                 self.lights
+            )));
+        }
+        if !(self.widest > 0.0 && self.widest <= PI) {
+            return Err(Error::invalid(format!(
+                "a light's largest angular radius is between 0° and 180°, not {}°",
+                self.widest.to_degrees()
             )));
         }
         if !(self.share > 0.0 && self.share < 1.0) {
@@ -120,18 +143,18 @@ impl LightOptions {
         let criteria = Criteria {
             most: Self::MOST,
             keep: self.lights,
+            widest: self.widest,
             share: f64::from(self.share),
             contrast: f64::from(self.contrast),
         };
-        let Extracted { mut lights, sun, pixels, coarse } =
+        let Extracted { mut lights, shares, pixels, coarse } =
             Extraction::new(grid, pixels).run(criteria, self.sun);
-        if let (Some(radius), true, Some(light)) = (self.sun_radius, sun, lights.first_mut()) {
-            light.radius = radius;
-            light.radius_source = RadiusSource::Requested;
-            light.kind = Kind::of(radius);
+        if let (Some(radius), Some(sun)) = (self.sun_radius, lights.sun().copied()) {
+            let sun = CompactLight { radius, radius_source: RadiusSource::Requested, ..sun };
+            lights = Lights::new(Some(sun), lights.others().iter().copied());
         }
         let harmonics = Sh::of(EnvironmentMap::trusted(grid, &pixels));
-        Light { grid, residual: pixels, coarse, lights, has_sun: sun, harmonics, angle: 0.0 }
+        Light { grid, residual: pixels, coarse, lights, shares, harmonics, angle: 0.0 }
     }
 }
 
@@ -141,7 +164,8 @@ impl Light {
         LightOptions::default().split(map.grid(), map.pixels().to_vec())
     }
 
-    /// The light of a field, decoded at `width` × `width`/2 pixels.
+    /// The light of a field, decoded at `width` × `width`/2 pixels. The lights of a code are known and are not looked for; one
+    /// without is decoded and searched.
     ///
     /// # Errors
     /// [`Error`] of kind `Invalid` if the width is odd or less than 2, or the field decodes to what is not finite.
@@ -150,31 +174,53 @@ impl Light {
             return Err(Error::invalid(format!("a panorama's width is even and at least 2, not {width}")));
         }
         let grid = Equirect::new(width, width / 2);
-        LightOptions::default().of_pixels(grid, field.bake(grid))
+        if field.lights().is_empty() {
+            return LightOptions::default().of_pixels(grid, field.bake(grid));
+        }
+        let none = LightOptions { lights: 0, ..LightOptions::default() };
+        Ok(none.of_pixels(grid, field.without_lights().bake(grid))?.with(field.lights().clone()))
     }
 
     /// A light that is split already: what is left without a sun, and the sun.
     pub fn of_parts(residual: EnvironmentMap<'_>, sun: Option<CompactLight>) -> Self {
         let options = LightOptions { lights: 0, ..LightOptions::default() };
-        let mut light = options.split(residual.grid(), residual.pixels().to_vec());
-        light.has_sun = sun.is_some();
-        light.lights.extend(sun);
-        light
+        options.split(residual.grid(), residual.pixels().to_vec()).with(Lights::new(sun, []))
+    }
+
+    /// A rest without lights, with these.
+    fn with(mut self, lights: Lights) -> Self {
+        let share = |light: &CompactLight| {
+            let (own, rest) = (luminance(light.irradiance), luminance(self.irradiance(light.direction)));
+            if own > 0.0 { own / (own + rest) } else { 0.0 }
+        };
+        self.shares = lights.iter().map(share).collect();
+        self.lights = lights;
+        self
     }
 
     /// The compact lights, the sun first, then the strongest first.
-    pub fn lights(&self) -> &[CompactLight] {
+    pub fn lights(&self) -> &Lights {
         &self.lights
+    }
+
+    /// For each of the lights, its share of the light that reached a surface facing it when it was found, 0 to 1 (luminance).
+    pub fn shares(&self) -> &[f32] {
+        &self.shares
     }
 
     /// The sun, where there is one.
     pub fn sun(&self) -> Option<&CompactLight> {
-        self.lights.first().filter(|_| self.has_sun)
+        self.lights.sun()
     }
 
     /// The map without the lights.
     pub fn residual(&self) -> EnvironmentMap<'_> {
         EnvironmentMap::trusted(self.grid, &self.residual)
+    }
+
+    /// The pixels of the map without the lights.
+    pub fn into_residual(self) -> Vec<[f32; 3]> {
+        self.residual
     }
 
     /// The map with every light as a disc of its radius: the whole again, sharpened where the map showed a glow. Energy is that
@@ -188,8 +234,7 @@ impl Light {
     /// The map with every light but the sun as a disc of its radius: what is sampled beside the sun.
     pub fn without_sun(&self) -> Vec<[f32; 3]> {
         let mut pixels = self.residual.clone();
-        let others = &self.lights[usize::from(self.sun().is_some())..];
-        others.iter().for_each(|light| light.add_to(self.grid, &mut pixels));
+        self.lights.others().iter().for_each(|light| light.add_to(self.grid, &mut pixels));
         pixels
     }
 
@@ -197,8 +242,7 @@ impl Light {
     pub fn mean(&self) -> [f32; 3] {
         let root = std::f64::consts::PI.sqrt();
         let rest = self.harmonics.coefficients()[0].map(|c| c * 0.5 / root);
-        let lights =
-            self.lights.iter().fold([0.0; 3], |s, l| [0, 1, 2].map(|c| s[c] + f64::from(l.irradiance[c])));
+        let lights = self.lights.integral();
         [0, 1, 2].map(|c| (rest[c] + lights[c] / (4.0 * std::f64::consts::PI)) as f32)
     }
 
@@ -225,7 +269,7 @@ impl Light {
             let weight = cell.solid_angle * cosine.max(0.0);
             sum = [0, 1, 2].map(|c| sum[c] + weight * f64::from(cell.radiance[c]));
         }
-        for light in &self.lights {
+        for light in self.lights.iter() {
             let on = light.irradiance_on(normal);
             sum = [0, 1, 2].map(|c| sum[c] + f64::from(on[c]));
         }

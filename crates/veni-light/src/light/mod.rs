@@ -7,7 +7,7 @@
 //! |---|---|
 //! | [`EnvironmentMap`] | radiance of all directions, borrowed |
 //! | [`Light`], [`LightOptions`] | a map split into compact lights, the sun first, and the rest |
-//! | [`CompactLight`], [`Disc`] | one light, and its exact place on pixels |
+//! | [`CompactLight`], [`Lights`], [`Disc`] | one light, those of a scene, and a light's exact place on pixels |
 //! | [`sh`] | spherical harmonics |
 //! | [`Spectrum`] | harmonics up to degrees in the hundreds |
 //! | [`Prefilter`], [`CubeMap`], [`Dfg`] | prefiltered maps, and the table that goes with them |
@@ -15,8 +15,6 @@
 //! | [`lobe_gains`], [`gauss_legendre`] | for spectra elsewhere: what a level makes of each degree, and a quadrature over latitudes |
 
 mod angle;
-mod compact;
-mod disc;
 mod environment;
 mod extract;
 mod lit;
@@ -30,8 +28,7 @@ mod spectrum;
 mod turn;
 mod vector;
 
-pub use compact::{CompactLight, Kind, RadiusSource};
-pub use disc::Disc;
+pub use crate::compact::{CompactLight, Disc, Kind, Lights, RadiusSource};
 pub use environment::EnvironmentMap;
 pub use extract::SunChoice;
 pub use lit::{Light, LightOptions};

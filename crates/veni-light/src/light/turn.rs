@@ -11,7 +11,7 @@ impl Light {
     #[must_use]
     pub fn turned(&self, angle: f64) -> Self {
         let mut out = self.clone();
-        out.lights.iter_mut().for_each(|light| *light = light.turned(angle as f32));
+        out.lights = self.lights.turned(angle);
         out.harmonics = self.harmonics.turned(angle);
         out.angle = self.angle + angle;
         // a column looks where one `shift` to its right looked

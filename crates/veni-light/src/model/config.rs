@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Conditioning, DecoderConfig};
+use crate::compact::Lights;
 use crate::limits::{
     MAX_CONDITION_FEATURES, MAX_ENCODER_NUMBERS, MAX_ENCODER_SAMPLES, MAX_TOKEN_NUMBERS, at_most,
 };
@@ -23,12 +24,22 @@ pub struct ModelConfig {
     /// The VN-ViT; absent in a decode-only model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub encoder: Option<EncoderConfig>,
+    /// Most compact lights of a code. So many are taken out of a panorama before the encoder and the losses see it: the field
+    /// describes what is left. 0: the paper's model, whose field holds everything.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub lights: usize,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_zero(n: &usize) -> bool {
+    *n == 0
 }
 
 impl ModelConfig {
     /// The paper's decoder for N latent vectors, without an encoder.
     pub fn decode_only(latent_vectors: usize) -> Self {
-        Self { kind: ModelKind::Veni, latent_vectors, decoder: DecoderConfig::default(), encoder: None }
+        let decoder = DecoderConfig::default();
+        Self { kind: ModelKind::Veni, latent_vectors, decoder, encoder: None, lights: 0 }
     }
 
     /// Checks every size: positive, and small enough that products of sizes stay far from overflow and what is computed
@@ -39,6 +50,10 @@ impl ModelConfig {
     /// [limits](crate::limits).
     pub fn validate(&self) -> Result<()> {
         within("latent_vectors", self.latent_vectors, 4096)?;
+        if self.lights > Lights::MOST {
+            let (lights, most) = (self.lights, Lights::MOST);
+            return Err(Error::invalid(format!("lights = {lights} is not between 0 and {most}")));
+        }
         self.decoder.validate()?;
         let features = self.decoder.condition_inputs(self.latent_vectors) as u64;
         at_most("condition features", features, MAX_CONDITION_FEATURES)?;

@@ -56,12 +56,17 @@ impl CubeFace {
     pub fn direction(self, frame: Frame, size: usize, column: usize, row: usize) -> [f32; 3] {
         assert!(column < size && row < size, "texel ({column}, {row}) of a face of {size} × {size}");
         let centre = |k: usize| (2 * k + 1) as f64 / size as f64 - 1.0;
-        let mut v = self.lookup(centre(column), centre(row));
+        self.towards(frame, centre(column), centre(row)).map(|c| c as f32)
+    }
+
+    /// Unit native direction of the place (a, b) of [`CubeFace::lookup`]; see [`CubeFace::direction`].
+    pub(crate) fn towards(self, frame: Frame, a: f64, b: f64) -> [f64; 3] {
+        let mut v = self.lookup(a, b);
         if frame == Frame::Bevy {
             v[2] = -v[2];
         }
         let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
-        frame.to_native(v.map(|c| (c / length) as f32))
+        frame.permuted(v.map(|c| c / length))
     }
 
     /// All unit native directions of a face, row-major; see [`CubeFace::direction`].

@@ -33,7 +33,13 @@ impl Frame {
 
     /// A direction of this frame in the native frame.
     #[inline]
-    pub fn to_native(self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    pub fn to_native(self, direction: [f32; 3]) -> [f32; 3] {
+        self.permuted(direction)
+    }
+
+    /// [`Frame::to_native`] in any precision.
+    #[inline]
+    pub(super) fn permuted<T: std::ops::Neg<Output = T>>(self, [x, y, z]: [T; 3]) -> [T; 3] {
         match self {
             Self::Blender => [x, y, z],
             Self::Gltf => [x, -z, y],

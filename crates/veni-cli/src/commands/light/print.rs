@@ -21,9 +21,10 @@ const WAYS: [(&str, [f32; 3]); 6] = [
 pub(super) fn json(light: &Light, convention: Option<Convention>, lux: Option<f64>) -> Value {
     let ways: serde_json::Map<_, _> =
         WAYS.iter().map(|(name, way)| ((*name).to_owned(), json!(light.irradiance(*way)))).collect();
+    let lights = compact(light);
     let mut value = json!({
-        "sun": light.sun().map(compact),
-        "lights": light.lights().iter().map(compact).collect::<Vec<_>>(),
+        "sun": light.sun().and(lights.first()),
+        "lights": lights,
         "sh": Convention::Native.of(&light.sh()),
         "sh_residual": Convention::Native.of(light.residual_sh()),
         "mean": light.mean(),
@@ -48,7 +49,12 @@ pub(super) fn json(light: &Light, convention: Option<Convention>, lux: Option<f6
     value
 }
 
-fn compact(light: &CompactLight) -> Value {
+/// Every compact light, the sun first.
+fn compact(light: &Light) -> Vec<Value> {
+    light.lights().iter().zip(light.shares()).map(|(one, share)| described(one, *share)).collect()
+}
+
+fn described(light: &CompactLight, share: f32) -> Value {
     json!({
         "direction": light.direction,
         "azimuth": light.azimuth().to_degrees(),
@@ -56,8 +62,8 @@ fn compact(light: &CompactLight) -> Value {
         "irradiance": light.irradiance,
         "radius": light.radius.to_degrees(),
         "radius_source": light.radius_source.to_string(),
-        "kind": light.kind.to_string(),
-        "share": light.share,
+        "kind": light.kind().to_string(),
+        "share": share,
         "clipped": light.clipped,
     })
 }
@@ -68,8 +74,8 @@ pub(super) fn text(name: &str, light: &Light, convention: Option<Convention>, lu
     if light.sun().is_none() {
         out += "  sun      none\n";
     }
-    for (at, one) in light.lights().iter().enumerate() {
-        line(&mut out, if at == 0 && light.sun().is_some() { "sun" } else { "light" }, one);
+    for (at, (one, share)) in light.lights().iter().zip(light.shares()).enumerate() {
+        line(&mut out, if at == 0 && light.sun().is_some() { "sun" } else { "light" }, one, *share);
     }
     let unit = lux.unwrap_or(1.0);
     let at = |way: [f32; 3]| unit * f64::from(luminance(light.irradiance(way)));
@@ -89,7 +95,7 @@ pub(super) fn text(name: &str, light: &Light, convention: Option<Convention>, lu
     out
 }
 
-fn line(out: &mut String, name: &str, light: &CompactLight) {
+fn line(out: &mut String, name: &str, light: &CompactLight, share: f32) {
     let ([x, y, z], [r, g, b]) = (light.direction, light.irradiance);
     let _ = writeln!(
         out,
@@ -98,8 +104,8 @@ fn line(out: &mut String, name: &str, light: &CompactLight) {
         light.azimuth().to_degrees(),
         light.radius.to_degrees(),
         light.radius_source,
-        100.0 * light.share,
-        light.kind,
+        100.0 * share,
+        light.kind(),
         if light.clipped { ", cut off: E⊥ is a lower bound" } else { "" },
     );
 }

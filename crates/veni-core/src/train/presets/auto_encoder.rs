@@ -7,6 +7,7 @@ use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
 use veni_data::{AugmentConfig, DataConfig};
 use veni_fit::schedule::{LearningRate, WeightSchedule};
+use veni_light::light::Lights;
 use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 
 /// Augmentation that keeps a sky a sky; chosen for a training set of some dozens.
@@ -55,6 +56,7 @@ pub(super) fn small(latent_vectors: usize) -> TrainConfig {
         ema_decay: 0.999,
         model: ModelConfig {
             kind: ModelKind::Veni,
+            lights: Lights::MOST,
             latent_vectors,
             decoder: DecoderConfig::default(),
             encoder: Some(EncoderConfig {
@@ -103,6 +105,7 @@ pub(super) fn tiny(latent_vectors: usize) -> TrainConfig {
         ema_decay: 0.9,
         model: ModelConfig {
             kind: ModelKind::Veni,
+            lights: 0,
             latent_vectors,
             decoder: DecoderConfig { hidden: 16, layers: 2, heads: 4, ..DecoderConfig::default() },
             encoder: Some(EncoderConfig {
@@ -141,6 +144,7 @@ pub(super) fn paper(latent_vectors: usize) -> TrainConfig {
         ema_decay: 0.0,
         model: ModelConfig {
             kind: ModelKind::Veni,
+            lights: 0,
             latent_vectors,
             decoder: DecoderConfig::default(),
             encoder: Some(EncoderConfig::default()),

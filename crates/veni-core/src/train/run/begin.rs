@@ -139,7 +139,8 @@ impl Trainer {
         let devices: Vec<_> = opened.into_iter().map(|opened| opened.device.autodiff()).collect();
         config.decoder_backend.check()?;
         let scratch = existing_above(folder);
-        let splits = Splits::open_observed(&config.data, config.seed, scratch, observer)?;
+        let splits =
+            Splits::open_observed(&config.data, config.seed, config.model.lights, scratch, observer)?;
         let running = |stage: Stage| -> Result<Running> {
             let needed = stage.own_data && stage.end() > done;
             let data = needed.then(|| own_data(&stage, &splits.val, scratch, observer)).transpose()?;
@@ -183,8 +184,8 @@ impl Trainer {
 fn own_data(stage: &Stage, val: &Dataset, scratch: &Path, observer: &dyn Observer) -> Result<Dataset> {
     let name = stage.name.as_deref().unwrap_or_default();
     let named = |e: Error| Error::invalid(format!("stage {name}: {}", e.with_source()));
-    let train =
-        Splits::open_observed(&stage.config.data, stage.config.seed, scratch, observer).map_err(named)?.train;
+    let TrainConfig { data, seed, model, .. } = &stage.config;
+    let train = Splits::open_observed(data, *seed, model.lights, scratch, observer).map_err(named)?.train;
     let file = |path: &Path| fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     let held_out: HashSet<_> = val.items().iter().map(|item| file(&item.path)).collect();
     let kept = train.retain(|item| !held_out.contains(&file(&item.path)));

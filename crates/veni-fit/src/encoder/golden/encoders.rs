@@ -16,12 +16,8 @@ use crate::{Encoded, Encoder};
 fn model(case: &Case, official: &Official) -> Model {
     let Official { config, latent_vectors, bindings, .. } = official;
     let decoder = DecoderConfig { hidden: 8, layers: 1, heads: 1, ..DecoderConfig::default() };
-    let config = ModelConfig {
-        kind: ModelKind::Veni,
-        latent_vectors: *latent_vectors,
-        decoder,
-        encoder: Some(config.clone()),
-    };
+    let config =
+        ModelConfig { decoder, encoder: Some(config.clone()), ..ModelConfig::decode_only(*latent_vectors) };
     let zeros = |shape: Vec<usize>| Array { data: vec![0.0; shape.iter().product()], shape };
     let mut all: BTreeMap<_, _> =
         decoder_schema(&config).into_iter().map(|(name, shape)| (name, zeros(shape))).collect();

@@ -8,9 +8,7 @@ use veni_gpu::GpuLight;
 use veni_gpu::shader::twin::{LightTwin, VeniLightSample};
 use veni_gpu::shader::{self, LightDensity, PackedLight, pack_light};
 use veni_gpu::wgpu::{self, BufferUsages};
-use veni_light::light::{
-    CompactLight, EnvironmentMap, Kind, Light, LightOptions, RadiusSource, Sampler, SplitSampler,
-};
+use veni_light::light::{CompactLight, EnvironmentMap, Light, LightOptions, Sampler, SplitSampler};
 use veni_light::random::Stream;
 use veni_light::sphere::Equirect;
 
@@ -19,8 +17,7 @@ use crate::util::{Gpu, directions};
 const GRID: Equirect = Equirect { width: 256, height: 128 };
 
 fn disc(direction: [f32; 3], irradiance: [f32; 3], radius: f32) -> CompactLight {
-    let (radius_source, kind) = (RadiusSource::Requested, Kind::of(radius));
-    CompactLight { direction, irradiance, radius, radius_source, kind, share: 0.0, clipped: false }
+    CompactLight::new(direction, irradiance, radius)
 }
 
 /// A sky with a dark half, a sun, a lamp below the horizon's height and a black pixel.

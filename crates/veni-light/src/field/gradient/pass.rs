@@ -3,9 +3,9 @@
 use pulp::Simd;
 
 use super::operations::{mask, scale_and_shift, standardise, unencode, unstandardise};
-use crate::field::Folded;
 use crate::field::block::{Row, encode, product, scatter};
 use crate::field::mlp::{Mlp, PANEL};
+use crate::field::{Folded, lobes};
 
 /// Hooks of the backward pass, given the gradient there. Called in the order of that pass: the output, the last layer
 /// from its second norm to its first, …, what is added before the first layer, the directional inputs.
@@ -163,6 +163,7 @@ impl<'a, S: Simd> Pass<'a, S> {
             scale_and_shift(simd, &tape.second[..hidden], &layer.gamma2, shift, x);
         }
         product::<S, false, false>(simd, &mlp.output, &mlp.output_bias, x, rgb);
+        lobes::add(simd, &folded.lobes, direction, &mut rgb[..3]);
     }
 
     /// From [`Pass::adjoint`] back to the inputs of the block that went forward last. May be called again.

@@ -11,6 +11,7 @@
 
 use super::backward::{Backward, Sums};
 use super::weight_sums::{WeightSums, layout};
+use crate::compact::Lights;
 use crate::field::Folded;
 use crate::field::aligned::Aligned;
 use crate::field::bfloat16::Bfloat16;
@@ -79,6 +80,9 @@ impl Perceptron {
             input_bias,
             no_bias: vec![0.0; padded],
             shift: added[1..].iter().map(|shift| shift.to_vec()).collect(),
+            lobes: Vec::new(),
+            lights: Lights::default(),
+            caps: Vec::new(),
             log_exposure: 0.0,
         })
     }
@@ -100,7 +104,15 @@ impl Perceptron {
             Aligned::default,
             |scratch, (Conditioned(folded), directions, out)| {
                 let mlp = &self.mlp;
-                pulp::Arch::new().dispatch(Blocks { mlp, folded, directions, out, log: true, scratch });
+                pulp::Arch::new().dispatch(Blocks {
+                    mlp,
+                    folded,
+                    directions,
+                    out,
+                    log: true,
+                    caps: false,
+                    scratch,
+                });
             },
         );
         out

@@ -10,9 +10,7 @@ use serde_json::Value;
 
 use super::distance;
 use crate::latent::Latent;
-use crate::model::{
-    Array, DecoderConfig, Model, ModelConfig, ModelInfo, ModelKind, VnReluForm, decoder_schema,
-};
+use crate::model::{Array, DecoderConfig, Model, ModelConfig, ModelInfo, VnReluForm, decoder_schema};
 
 struct Case {
     name: String,
@@ -57,7 +55,7 @@ impl Case {
             vn_relu,
             ..DecoderConfig::default()
         };
-        ModelConfig { kind: ModelKind::Veni, latent_vectors: self.size("latent_dim"), decoder, encoder: None }
+        ModelConfig { decoder, ..ModelConfig::decode_only(self.size("latent_dim")) }
     }
 
     /// The file's weights under our names, [out, in] transposed.

@@ -2,6 +2,7 @@
 
 mod golden;
 mod gradient;
+mod lights;
 mod moments;
 mod normal;
 mod properties;

@@ -8,8 +8,8 @@ mod sun;
 
 use std::ops::Range;
 
-use super::compact::{CompactLight, Kind};
 use super::luminance::luminance;
+use crate::compact::{CompactLight, Kind, Lights};
 use crate::light::vector::{angle, dot, normalised};
 use crate::sphere::Equirect;
 use crate::tasks;
@@ -58,6 +58,8 @@ pub(super) struct Criteria {
     pub(super) most: usize,
     /// So many are kept, the sun first; the others are put back.
     pub(super) keep: usize,
+    /// Those of a larger angular radius are put back too, radians.
+    pub(super) widest: f32,
     pub(super) share: f64,
     pub(super) contrast: f64,
 }
@@ -82,6 +84,10 @@ struct Change {
 #[derive(Clone, Copy, Debug)]
 struct Found {
     light: CompactLight,
+    /// How wide what was taken is.
+    kind: Kind,
+    /// Its share of the light that reached a surface facing it, 0 to 1 (luminance).
+    share: f32,
     /// The middle of its brightest part.
     core: [f32; 3],
     /// Its peak luminance over that of its background.
@@ -94,10 +100,9 @@ struct Found {
 
 /// What an extraction gives.
 pub(super) struct Extracted {
-    /// The sun first.
-    pub(super) lights: Vec<CompactLight>,
-    /// Whether the first is the sun.
-    pub(super) sun: bool,
+    pub(super) lights: Lights,
+    /// A light's share of the light that reached a surface facing it, 0 to 1 (luminance), for each.
+    pub(super) shares: Vec<f32>,
     /// What is left.
     pub(super) pixels: Vec<[f32; 3]>,
     /// The same at about 256 columns.
@@ -143,17 +148,25 @@ impl Extraction {
         if let Some(at) = sun {
             found[..=at].rotate_right(1);
             // shadows of the sun fall by its brightest part, whatever glows around it
-            let Found { light, core, .. } = &mut found[0];
-            if light.kind == Kind::Glow {
+            let Found { light, core, kind, .. } = &mut found[0];
+            if *kind == Kind::Glow {
                 light.direction = *core;
             }
         }
-        for f in found.drain(criteria.keep.min(found.len())..).rev() {
+        let narrow = |f: &Found| f.light.radius <= criteria.widest;
+        sun = sun.filter(|_| found.first().is_some_and(narrow));
+        let (mut kept, mut others): (Vec<_>, Vec<_>) = found.into_iter().partition(narrow);
+        others.extend(kept.drain(criteria.keep.min(kept.len())..));
+        others.sort_by_key(|f| std::cmp::Reverse(f.order));
+        for f in others {
             self.put_back(f.order);
         }
-        let lights = found.into_iter().map(|f| f.light).collect();
+        let found = kept;
+        let shares = found.iter().map(|f| f.share).collect();
+        let mut lights = found.into_iter().map(|f| f.light);
+        let lights = Lights::new(sun.and_then(|_| lights.next()), lights);
         let coarse = self.levels.swap_remove(self.levels.len() - 1).keep(&self.pixels);
-        Extracted { lights, sun: sun.is_some(), pixels: self.pixels, coarse }
+        Extracted { lights, shares, pixels: self.pixels, coarse }
     }
 
     /// The light at the brightest pixel near a direction, however faint.
@@ -273,11 +286,10 @@ impl Extraction {
             irradiance: energy.map(|e| e as f32),
             radius: radius as f32,
             radius_source,
-            kind,
-            share: (luminance_of(energy) / facing).min(1.0) as f32,
             clipped,
         };
-        Found { light, core: core.map(|c| c as f32), contrast: measured.contrast(), peak, order }
+        let share = (luminance_of(energy) / facing).min(1.0) as f32;
+        Found { light, kind, share, core: core.map(|c| c as f32), contrast: measured.contrast(), peak, order }
     }
 
     /// Undoes a taking, whatever was taken since.

@@ -2,7 +2,7 @@
 
 use super::level::View;
 use super::measure::Measured;
-use crate::light::compact::{CompactLight, RadiusSource};
+use crate::compact::{CompactLight, RadiusSource};
 use crate::light::luminance::luminance;
 
 /// A disc of fewer pixels than this in radius has perhaps no pixel that it fills: its peak says nothing about its radiance.

@@ -6,7 +6,7 @@
 use super::level::View;
 use super::measure::quantile;
 use super::{Found, SunChoice};
-use crate::light::compact::Kind;
+use crate::compact::Kind;
 use crate::light::luminance::luminance;
 
 /// Solid angle over which a peak is averaged at least, steradians: a pixel of a panorama of 256 columns.
@@ -63,12 +63,12 @@ impl Surroundings {
     fn is_sun(&self, found: &Found, all: &[Found]) -> bool {
         let light = &found.light;
         let energy = f64::from(luminance(light.irradiance));
-        let least = match light.kind {
+        let least = match found.kind {
             Kind::Disc if light.direction[2] > LOW => SHARE[1],
             Kind::Disc => SHARE[2],
             Kind::Glow | Kind::Lobe => SHARE[0],
         };
-        let prominent = if light.kind == Kind::Disc { DISC } else { SPREAD };
+        let prominent = if found.kind == Kind::Disc { DISC } else { SPREAD };
         let sky = self.zenith / energy;
         let night = sky < DARK_SKY && self.zenith < DARK * self.ground;
         let alike = |other: &&Found| {
@@ -76,7 +76,7 @@ impl Surroundings {
                 && other.contrast > 100.0
                 && 4.0 * f64::from(luminance(other.light.irradiance)) > energy
         };
-        light.share >= least
+        found.share >= least
             && found.peak.min(energy / PATCH) >= prominent * self.bright
             && !night
             && all.iter().filter(alike).count() < LAMPS

@@ -1,21 +1,12 @@
 //! Every level against a sum over all pixels.
 
 use super::*;
-use crate::light::{Kind, RadiusSource};
 use crate::sphere::{CubeFace, Equirect};
 
 /// A sun of its true size with the energy of a clear day.
 pub(super) fn sun(direction: [f32; 3]) -> CompactLight {
     let length = direction.iter().map(|v| v * v).sum::<f32>().sqrt();
-    CompactLight {
-        direction: direction.map(|v| v / length),
-        irradiance: [6.0, 5.0, 4.0],
-        radius: CompactLight::SUN_RADIUS,
-        radius_source: RadiusSource::Assumed,
-        kind: Kind::Disc,
-        share: 0.7,
-        clipped: false,
-    }
+    CompactLight::new(direction.map(|v| v / length), [6.0, 5.0, 4.0], CompactLight::SUN_RADIUS)
 }
 
 /// A sky with a gradient, an aureole, a dark ground with a sharp horizon, and blocks of a few degrees: of all scales.
@@ -151,7 +142,7 @@ fn levels_are_the_sum_over_all_pixels() {
             // a lobe that is half a texel off is noticed
             if k == 0 {
                 let mut moved = prefilter.clone();
-                let shifted = light.turned((1.0 / levels.size(level) as f32).max(0.02));
+                let shifted = light.turned((1.0 / levels.size(level) as f64).max(0.02));
                 moved.lights = vec![shifted];
                 let cube = moved.level(p, levels.size(level), CubeAxes::BEVY);
                 let mut sums = (0.0, 0.0);
@@ -221,7 +212,7 @@ fn a_turn_commutes_with_the_filter() {
         let map = EnvironmentMap::new(grid, pixels).unwrap();
         Prefilter::new(map, &[levels]).with_lights(&[light]).level(0.5, 16, CubeAxes::NATIVE)
     };
-    let (a, b) = (bake(&turned, light.turned(std::f32::consts::FRAC_PI_2)), bake(&pixels, light));
+    let (a, b) = (bake(&turned, light.turned(std::f64::consts::FRAC_PI_2)), bake(&pixels, light));
     for (k, texel) in a.texels().iter().enumerate() {
         // seen after a quarter turn back
         let [x, y, z] = direction(16, CubeAxes::NATIVE, k);

@@ -1,7 +1,7 @@
 //! LIGHT 3.4 (9), (10): that draws follow the density, and that they save samples.
 
 use super::*;
-use crate::light::{CompactLight, Kind, RadiusSource};
+use crate::light::CompactLight;
 use crate::random::Stream;
 
 const PIXELS: [usize; 2] = [96, 48];
@@ -180,15 +180,7 @@ fn odd_maps_have_an_answer() {
 #[test]
 fn samples_are_saved() {
     let grid = Equirect::new(256, 128);
-    let sun = CompactLight {
-        direction: [0.48, -0.6, 0.64],
-        irradiance: [3.0; 3],
-        radius: 0.02,
-        radius_source: RadiusSource::Measured,
-        kind: Kind::Disc,
-        share: 0.5,
-        clipped: false,
-    };
+    let sun = CompactLight::new([0.48, -0.6, 0.64], [3.0; 3], 0.02);
     let rest: Vec<[f32; 3]> = sky(grid).into_iter().map(|p| p.map(|v| v.min(2.0))).collect();
     let mut whole = rest.clone();
     let level = sun.radiance()[0];
@@ -229,15 +221,7 @@ fn samples_are_saved() {
 fn two_lights_are_one_sky() {
     let pixels: Vec<[f32; 3]> = sky(grid()).into_iter().map(|p| p.map(|v| v.min(2.0))).collect();
     let map = EnvironmentMap::new(grid(), &pixels).unwrap();
-    let sun = CompactLight {
-        direction: [0.48, -0.6, 0.64],
-        irradiance: [3.0, 2.5, 2.0],
-        radius: CompactLight::SUN_RADIUS,
-        radius_source: RadiusSource::Assumed,
-        kind: Kind::Disc,
-        share: 0.5,
-        clipped: false,
-    };
+    let sun = CompactLight::new([0.48, -0.6, 0.64], [3.0, 2.5, 2.0], CompactLight::SUN_RADIUS);
     let sampler = SplitSampler::new(sun, Sampler::new(map));
     assert!(sampler.share() > 0.1 && sampler.share() < 0.9);
     let (mut next, draws) = (numbers(5), 400_000);

@@ -10,8 +10,8 @@ mod window;
 
 use std::f64::consts::PI;
 
-use super::compact::CompactLight;
 use super::environment::EnvironmentMap;
+use crate::compact::CompactLight;
 use crate::{Error, Result};
 
 pub use basis::Basis;

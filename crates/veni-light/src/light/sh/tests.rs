@@ -1,7 +1,6 @@
 use std::f64::consts::PI;
 
 use super::*;
-use crate::light::compact::{Kind, RadiusSource};
 use crate::sphere::Equirect;
 
 const GRID: Equirect = Equirect { width: 256, height: 128 };
@@ -18,15 +17,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn sun(direction: [f32; 3], radius: f32) -> CompactLight {
-    CompactLight {
-        direction,
-        irradiance: [3.0, 2.0, 1.0],
-        radius,
-        radius_source: RadiusSource::Measured,
-        kind: Kind::of(radius),
-        share: 0.5,
-        clipped: false,
-    }
+    CompactLight::new(direction, [3.0, 2.0, 1.0], radius)
 }
 
 fn close<const N: usize>(a: [f32; N], b: [f32; N], tolerance: f32) -> bool {

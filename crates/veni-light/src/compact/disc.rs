@@ -2,8 +2,9 @@
 //! seam. LIGHT (9).
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
-use super::compact::CompactLight;
+use super::CompactLight;
 use crate::sphere::Equirect;
 
 /// Nodes and weights of Gauss–Legendre quadrature on [−1, 1], twelve points, one half of the symmetric rule.
@@ -39,41 +40,56 @@ impl Disc {
     /// What part of the disc's solid angle lies in which pixel: row-major indices, perhaps one twice, and parts
     /// that sum to 1. A disc without extent lies in one pixel.
     pub fn parts(self, grid: Equirect) -> Vec<(usize, f64)> {
-        let (width, height) = (grid.width as f64, grid.height as f64);
-        let centre = (PI - self.azimuth) / (2.0 * PI) * width;
-        if self.radius < POINT {
-            let row = ((self.polar / PI * height) as usize).min(grid.height - 1);
-            return vec![(row * grid.width + centre as usize % grid.width, 1.0)];
-        }
-        let row_of = |polar: f64| ((polar / PI * height).max(0.0) as usize).min(grid.height - 1);
-        let mut parts = Vec::new();
-        for row in row_of(self.polar - self.radius)..=row_of(self.polar + self.radius) {
-            let (top, bottom) = (PI * row as f64 / height, PI * (row + 1) as f64 / height);
-            let half = self.widest(top, bottom) * width / (2.0 * PI);
-            let (first, last) = ((centre - half).floor(), (centre + half).ceil());
-            let inside = self.narrowest(top, bottom);
-            let whole = grid.solid_angle(row);
-            // the area left of the last edge that was looked at
-            let mut known = (f64::NAN, 0.0);
-            let offset = |edge: f64| (edge - centre) * 2.0 * PI / width;
-            for left in first as isize..last as isize {
-                let (from, to) = (offset(left as f64), offset(left as f64 + 1.0));
-                let area = if from.abs().max(to.abs()) <= inside {
-                    whole
-                } else {
-                    let before = if known.0 == from { known.1 } else { self.left_of(from, top, bottom) };
-                    known = (to, self.left_of(to, top, bottom));
-                    known.1 - before
-                };
-                if area > 0.0 {
-                    parts.push((row * grid.width + left.rem_euclid(grid.width as isize) as usize, area));
-                }
-            }
+        let (mut parts, mut of_row) = (Vec::new(), Vec::new());
+        for row in self.rows(grid, 0..grid.height) {
+            self.row_parts(grid, row, &mut of_row);
+            parts.extend(of_row.drain(..).map(|(column, part)| (row * grid.width + column, part)));
         }
         // the quadrature's last digits must not change the energy
         let total: f64 = parts.iter().map(|p| p.1).sum();
         parts.iter_mut().for_each(|part| part.1 /= total);
         parts
+    }
+
+    /// Those of `rows` that the disc may reach.
+    pub(crate) fn rows(self, grid: Equirect, rows: Range<usize>) -> Range<usize> {
+        let height = grid.height as f64;
+        let row_of = |polar: f64| ((polar / PI * height).max(0.0) as usize).min(grid.height - 1);
+        let extent = if self.radius < POINT { 0.0 } else { self.radius };
+        let (first, last) = (row_of(self.polar - extent), row_of(self.polar + extent));
+        first.max(rows.start)..(last + 1).min(rows.end).max(first.max(rows.start))
+    }
+
+    /// What part of the disc's solid angle lies in which column of one of its [`Disc::rows`], appended: columns, perhaps one twice.
+    pub(crate) fn row_parts(self, grid: Equirect, row: usize, parts: &mut Vec<(usize, f64)>) {
+        let (width, height) = (grid.width as f64, grid.height as f64);
+        let centre = (PI - self.azimuth) / (2.0 * PI) * width;
+        if self.radius < POINT {
+            return parts.push((centre as usize % grid.width, 1.0));
+        }
+        let half = (0.5 * self.radius).sin();
+        let disc = 4.0 * PI * half * half;
+        let (top, bottom) = (PI * row as f64 / height, PI * (row + 1) as f64 / height);
+        let half = self.widest(top, bottom) * width / (2.0 * PI);
+        let (first, last) = ((centre - half).floor(), (centre + half).ceil());
+        let inside = self.narrowest(top, bottom);
+        let whole = grid.solid_angle(row);
+        // the area left of the last edge that was looked at
+        let mut known = (f64::NAN, 0.0);
+        let offset = |edge: f64| (edge - centre) * 2.0 * PI / width;
+        for left in first as isize..last as isize {
+            let (from, to) = (offset(left as f64), offset(left as f64 + 1.0));
+            let area = if from.abs().max(to.abs()) <= inside {
+                whole
+            } else {
+                let before = if known.0 == from { known.1 } else { self.left_of(from, top, bottom) };
+                known = (to, self.left_of(to, top, bottom));
+                known.1 - before
+            };
+            if area > 0.0 {
+                parts.push((left.rem_euclid(grid.width as isize) as usize, area / disc));
+            }
+        }
     }
 
     /// Half of the disc's width in azimuth at a polar angle: sin²(h/2) = sin((r+δ)/2) sin((r−δ)/2) / (sin θ sin θ_c), δ = θ − θ_c.
@@ -145,10 +161,15 @@ impl CompactLight {
     pub fn add_to(&self, grid: Equirect, pixels: &mut [[f32; 3]]) {
         assert_eq!(pixels.len(), grid.len(), "pixels of a {} × {} grid", grid.width, grid.height);
         for (index, part) in Disc::new(self.direction, self.radius).parts(grid) {
-            let weight = part / grid.solid_angle(index / grid.width);
-            for (value, irradiance) in pixels[index].iter_mut().zip(self.irradiance) {
-                *value = (f64::from(*value) + weight * f64::from(irradiance)) as f32;
-            }
+            self.add_part(part / grid.solid_angle(index / grid.width), &mut pixels[index]);
+        }
+    }
+
+    /// Adds the radiance of a part of the light, divided by a pixel's solid angle.
+    #[inline]
+    pub(super) fn add_part(&self, weight: f64, pixel: &mut [f32; 3]) {
+        for (value, irradiance) in pixel.iter_mut().zip(self.irradiance) {
+            *value = (f64::from(*value) + weight * f64::from(irradiance)) as f32;
         }
     }
 }
@@ -216,6 +237,15 @@ mod tests {
                 for radius in [0.0, 1e-8, 0.004_651, 0.2] {
                     let parts = Disc::new(direction(azimuth, elevation), radius).parts(grid);
                     let sum: f64 = parts.iter().map(|p| p.1).sum();
+                    // row by row it is that of the disc itself
+                    let disc = Disc::new(direction(azimuth, elevation), radius);
+                    let mut rows = Vec::new();
+                    disc.rows(grid, 0..grid.height).for_each(|row| disc.row_parts(grid, row, &mut rows));
+                    let by_rows: f64 = rows.iter().map(|p| p.1).sum();
+                    assert!(
+                        (by_rows - 1.0).abs() < 1e-6,
+                        "{width}, {azimuth}, {elevation}, {radius}: {by_rows}"
+                    );
                     assert!(
                         (sum - 1.0).abs() < 1e-10 && parts.iter().all(|p| p.1 > 0.0),
                         "{width}, {elevation}, {radius}"
@@ -228,15 +258,7 @@ mod tests {
     #[test]
     fn a_covered_pixel_has_the_radiance_of_the_disc() {
         let grid = Equirect::new(2048, 1024);
-        let light = CompactLight {
-            direction: direction(180.0, 20.0),
-            irradiance: [2.0, 1.0, 0.5],
-            radius: 0.05,
-            radius_source: crate::light::RadiusSource::Measured,
-            kind: crate::light::Kind::Glow,
-            share: 0.0,
-            clipped: false,
-        };
+        let light = CompactLight::new(direction(180.0, 20.0), [2.0, 1.0, 0.5], 0.05);
         let mut pixels = vec![[0.0; 3]; grid.len()];
         light.add_to(grid, &mut pixels);
         let [x, y] = grid.pixel(light.direction);

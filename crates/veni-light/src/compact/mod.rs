@@ -1,4 +1,11 @@
-//! A compact light: what reaches a scene from one small solid angle, told by a few numbers.
+//! Compact lights: what reaches a scene from a few small solid angles, each told by seven numbers. LIGHT (1) to (9).
+
+mod cube;
+mod disc;
+mod lights;
+
+pub use disc::Disc;
+pub use lights::Lights;
 
 use std::fmt;
 
@@ -17,10 +24,6 @@ pub struct CompactLight {
     pub radius: f32,
     /// Where the radius comes from.
     pub radius_source: RadiusSource,
-    /// What the panorama shows of it.
-    pub kind: Kind,
-    /// Its share of the light that reaches a surface facing it, 0 to 1 (luminance).
-    pub share: f32,
     /// Whether the panorama's largest value cut it off: the irradiance is then a lower bound.
     pub clipped: bool,
 }
@@ -36,7 +39,7 @@ pub enum RadiusSource {
     Requested,
 }
 
-/// What a panorama shows of a [`CompactLight`].
+/// How wide a [`CompactLight`] is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// A disc of less than 1.5° radius.
@@ -48,11 +51,16 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Largest angular radius of a disc, degrees.
+    const DISC: f32 = 1.5;
+    /// Largest angular radius of a glow, degrees.
+    pub(crate) const GLOW: f32 = 6.0;
+
     /// The kind of a light of this angular radius, radians.
     pub fn of(radius: f32) -> Self {
         match radius.to_degrees() {
-            r if r < 1.5 => Self::Disc,
-            r if r <= 6.0 => Self::Glow,
+            r if r < Self::DISC => Self::Disc,
+            r if r <= Self::GLOW => Self::Glow,
             _ => Self::Lobe,
         }
     }
@@ -86,6 +94,16 @@ impl CompactLight {
     const SMALL: f32 = 1e-2;
     /// Points of a disc that is cut.
     const POINTS: usize = 64;
+
+    /// A light of this unit direction, irradiance at normal incidence and angular radius in radians.
+    pub fn new(direction: [f32; 3], irradiance: [f32; 3], radius: f32) -> Self {
+        Self { direction, irradiance, radius, radius_source: RadiusSource::Requested, clipped: false }
+    }
+
+    /// How wide it is.
+    pub fn kind(&self) -> Kind {
+        Kind::of(self.radius)
+    }
 
     /// Azimuth in radians, counter-clockwise from +x seen from above, in (−π, π].
     pub fn azimuth(&self) -> f32 {
@@ -143,9 +161,9 @@ impl CompactLight {
 
     /// The same light after a turn by `angle` radians about z, counter-clockwise seen from above.
     #[must_use]
-    pub fn turned(mut self, angle: f32) -> Self {
-        let ((s, c), [x, y, z]) = (angle.sin_cos(), self.direction);
-        self.direction = [c * x - s * y, s * x + c * y, z];
+    pub fn turned(mut self, angle: f64) -> Self {
+        let ((s, c), [x, y, z]) = (angle.sin_cos(), self.direction.map(f64::from));
+        self.direction = [c * x - s * y, s * x + c * y, z].map(|v| v as f32);
         self
     }
 }
@@ -155,15 +173,7 @@ mod tests {
     use super::*;
 
     fn light(direction: [f32; 3]) -> CompactLight {
-        CompactLight {
-            direction,
-            irradiance: [3.0, 2.0, 1.0],
-            radius: CompactLight::SUN_RADIUS,
-            radius_source: RadiusSource::Assumed,
-            kind: Kind::Disc,
-            share: 0.5,
-            clipped: false,
-        }
+        CompactLight::new(direction, [3.0, 2.0, 1.0], CompactLight::SUN_RADIUS)
     }
 
     #[test]

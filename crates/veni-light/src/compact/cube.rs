@@ -1,0 +1,121 @@
+//! A disc on the texels of a cube map: its energy is right at any size.
+
+use std::f64::consts::PI;
+
+use super::CompactLight;
+use crate::sphere::{CubeFace, Frame};
+
+/// Places along a side of a texel that the disc's edge crosses; more where the disc is smaller than a texel.
+const PLACES: f64 = 16.0;
+/// Most places along a side.
+const MOST_PLACES: f64 = 256.0;
+
+impl CompactLight {
+    /// What part of the light lies in which texel of a cube map of `size` whose faces are named by `frame`
+    /// ([`CubeFace::direction`]): indices face after face, row-major, ascending, and parts that sum to 1.
+    pub fn cube_parts(&self, frame: Frame, size: usize) -> Vec<(usize, f64)> {
+        let towards = self.direction.map(f64::from);
+        let half = (0.5 * f64::from(self.radius)).sin();
+        let square = 4.0 * half * half;
+        // half of a texel's diagonal, at most, at the middle of a face
+        let reach = f64::from(self.radius) + 2f64.sqrt() / size as f64;
+        let reach = 4.0 * (0.5 * reach.min(PI)).sin().powi(2);
+        let apart = |d: [f64; 3]| d.iter().zip(towards).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        let texel = 2.0 / size as f64;
+        let places = (PLACES * texel / f64::from(self.radius).max(1e-9)).clamp(PLACES, MOST_PLACES).ceil();
+        let (count, mut parts, mut nearest) = (places as usize, Vec::new(), (f64::INFINITY, 0));
+        for (index, (face, row, column)) in texels(size).enumerate() {
+            let [a, b] = [column, row].map(|k| (k as f64 + 0.5) * texel - 1.0);
+            let centre = apart(face.towards(frame, a, b));
+            if centre < nearest.0 {
+                nearest = (centre, index);
+            }
+            if centre > reach {
+                continue;
+            }
+            let corners = [(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)];
+            let inside =
+                |(i, j): &(f64, f64)| apart(face.towards(frame, a + i * texel, b + j * texel)) <= square;
+            let part = if self.radius < 0.5 && corners.iter().all(inside) {
+                CubeFace::solid_angle(size, column, row)
+            } else {
+                let place = |k: usize| ((k as f64 + 0.5) / places - 0.5) * texel;
+                let mut covered = 0.0;
+                for (i, j) in (0..count * count).map(|k| (place(k % count), place(k / count))) {
+                    let (a, b) = (a + i, b + j);
+                    if apart(face.towards(frame, a, b)) <= square {
+                        covered += (1.0 + a * a + b * b).powf(-1.5);
+                    }
+                }
+                covered * (texel / places).powi(2)
+            };
+            if part > 0.0 {
+                parts.push((index, part));
+            }
+        }
+        if parts.is_empty() {
+            return vec![(nearest.1, 1.0)];
+        }
+        let total: f64 = parts.iter().map(|part| part.1).sum();
+        parts.iter_mut().for_each(|part| part.1 /= total);
+        parts
+    }
+}
+
+/// Face, row and column of every texel.
+fn texels(size: usize) -> impl Iterator<Item = (CubeFace, usize, usize)> {
+    let face = move |face| (0..size * size).map(move |k| (face, k / size, k % size));
+    CubeFace::ALL.into_iter().flat_map(face)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_sum_to_one_where_the_light_is() {
+        for frame in Frame::ALL {
+            for (direction, radius) in [
+                ([0.6, 0.0, 0.8], 0.0),
+                ([0.6, 0.0, 0.8], CompactLight::SUN_RADIUS),
+                ([0.57735, 0.57735, 0.57735], 0.05),
+                ([-0.48, 0.64, -0.6], 0.4),
+                ([0.0, 0.0, 1.0], 0.9),
+            ] {
+                for size in [1, 8, 33] {
+                    let parts = CompactLight::new(direction, [1.0; 3], radius).cube_parts(frame, size);
+                    let sum: f64 = parts.iter().map(|part| part.1).sum();
+                    assert!((sum - 1.0).abs() < 1e-12, "{frame:?} {direction:?} {radius} {size}: {sum}");
+                    assert!(parts.windows(2).all(|pair| pair[0].0 < pair[1].0));
+                    // the mean direction of the parts is the light's
+                    let mut mean = [0.0; 3];
+                    for (index, part) in parts {
+                        let (face, texel) = (CubeFace::ALL[index / (size * size)], index % (size * size));
+                        let d = face.direction(frame, size, texel % size, texel / size);
+                        mean = [0, 1, 2].map(|c| mean[c] + part * f64::from(d[c]));
+                    }
+                    let length = mean.iter().map(|c| c * c).sum::<f64>().sqrt();
+                    let cosine: f64 =
+                        mean.iter().zip(direction).map(|(a, b)| a / length * f64::from(b)).sum();
+                    let most = if size == 1 { 1.0 } else { 1.5 / size as f64 };
+                    assert!(
+                        cosine.min(1.0).acos() < most,
+                        "{frame:?} {direction:?} {radius} {size}: {cosine}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_texel_in_the_disc_has_its_radiance() {
+        let (size, light) = (64, CompactLight::new([0.6, 0.0, 0.8], [1.0; 3], 0.1));
+        let parts = light.cube_parts(Frame::Blender, size);
+        let radiance = parts.iter().map(|(index, part)| {
+            let texel = index % (size * size);
+            part / CubeFace::solid_angle(size, texel % size, texel / size)
+        });
+        let most = radiance.fold(0.0, f64::max);
+        assert!((most / f64::from(light.radiance()[0]) - 1.0).abs() < 2e-3, "{most}");
+    }
+}

@@ -1,0 +1,67 @@
+//! A spherical Gaussian of log radiance: detail where the vectors of a code do not reach. MODEL (37).
+
+use crate::limits::MAX_LOBES;
+use crate::{Error, Result};
+
+/// Adds a e^{s(⟨d,u⟩ − 1)} to log radiance: amplitude a in the direction u, 1/e of it where 1 − cos of the angle is 1/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lobe {
+    /// Unit direction u of the middle, native frame.
+    pub direction: [f32; 3],
+    /// Amplitude a (R, G, B), of either sign, in natural log radiance.
+    pub amplitude: [f32; 3],
+    /// Sharpness s > 0; the lobe's standard deviation is about 1/√s radians.
+    pub sharpness: f32,
+}
+
+impl Lobe {
+    /// What it adds to log radiance in a unit direction.
+    pub fn value(&self, direction: [f32; 3]) -> [f32; 3] {
+        let cosine: f32 = self.direction.iter().zip(direction).map(|(a, b)| a * b).sum();
+        let gauss = (self.sharpness * (cosine - 1.0)).exp();
+        self.amplitude.map(|a| a * gauss)
+    }
+
+    /// The same lobe after a turn by `angle` radians about z, counter-clockwise seen from above.
+    #[must_use]
+    pub fn turned(mut self, angle: f64) -> Self {
+        let ((s, c), [x, y, z]) = (angle.sin_cos(), self.direction.map(f64::from));
+        self.direction = [c * x - s * y, s * x + c * y, z].map(|v| v as f32);
+        self
+    }
+
+    /// The lobe of the mirrored scene: azimuth φ becomes −φ.
+    #[must_use]
+    pub fn mirrored(mut self) -> Self {
+        self.direction[1] = -self.direction[1];
+        self
+    }
+
+    /// The same lobe, `factor` times as high.
+    #[must_use]
+    pub(super) fn scaled(mut self, factor: f32) -> Self {
+        self.amplitude = self.amplitude.map(|a| a * factor);
+        self
+    }
+
+    /// Refuses what is no lobe.
+    pub(super) fn check(lobes: &[Self]) -> Result<()> {
+        if lobes.len() > MAX_LOBES {
+            return Err(Error::too_large(format!("{} lobes, at most {MAX_LOBES} are taken", lobes.len())));
+        }
+        for (at, lobe) in lobes.iter().enumerate() {
+            let square: f32 = lobe.direction.iter().map(|c| c * c).sum();
+            let wrong = if !((square - 1.0).abs() < 1e-3) {
+                format!("direction {:?} is not of length 1", lobe.direction)
+            } else if !lobe.amplitude.iter().all(|a| a.is_finite()) {
+                format!("amplitude {:?} is not finite", lobe.amplitude)
+            } else if !(lobe.sharpness > 0.0 && lobe.sharpness.is_finite()) {
+                format!("sharpness {} is not positive", lobe.sharpness)
+            } else {
+                continue;
+            };
+            return Err(Error::invalid(format!("lobe {at}: its {wrong}")));
+        }
+        Ok(())
+    }
+}
