@@ -7,6 +7,8 @@ mod avif;
 mod bad_input;
 #[cfg(feature = "learn")]
 mod bake;
+#[cfg(feature = "pretrained")]
+mod codes;
 #[cfg(feature = "learn")]
 mod crashes;
 #[cfg(feature = "pretrained")]

@@ -23,7 +23,7 @@ pub mod nn;
 pub mod train;
 pub mod vae;
 
-pub use loaded::LoadedModel;
+pub use loaded::{LoadedModel, Rest};
 pub use veni_data::{self as data, expand, prepare};
 pub use veni_fit::shade;
 pub use veni_image as panorama;

@@ -1,5 +1,6 @@
 //! A model file with its networks, ready to encode, decode and be fitted to.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use burn::tensor::Device;
@@ -21,6 +22,15 @@ pub struct LoadedModel {
     model: Arc<Model>,
     decoder: Arc<Decoding>,
     device: Device,
+}
+
+/// What is left of an image without its compact lights.
+#[derive(Clone, Debug)]
+pub struct Rest<'a> {
+    /// Log radiance at exposure 0, 3·W·H values.
+    pub log_radiance: Cow<'a, [f32]>,
+    /// A code without vectors: the lights, and the exposure that the rest lies above or below the image's.
+    pub code: Latent,
 }
 
 /// How the decoder is evaluated. Both give the same values.
@@ -133,17 +143,42 @@ impl LoadedModel {
         self.veni().map(Veni::stripes).transpose()
     }
 
-    /// The means of the encoder's posteriors for images of log radiance at exposure 0.
+    /// The means of the encoder's posteriors for images of log radiance at exposure 0; with the lights of each image, where the
+    /// model's codes have some.
     ///
     /// # Errors
     /// [`Error::Invalid`] if there is no encoder; otherwise as [`Veni::encode`].
     pub fn encode(&self, grid: Equirect, images: &[&[f32]]) -> Result<Vec<Latent>> {
-        let veni =
-            self.veni().ok_or_else(|| Error::invalid(format!("{}: this model has no encoder", self.name)))?;
-        Ok(veni.encode(grid, images)?.into_iter().map(|e| Latent::new(e.vectors)).collect())
+        let rests =
+            images.iter().map(|image| self.without_lights(grid, image)).collect::<Result<Vec<_>>>()?;
+        let views: Vec<_> = rests.iter().map(|rest| &*rest.log_radiance).collect();
+        let vectors = self.encode_rest(grid, &views)?;
+        let whole = rests.iter().zip(vectors);
+        Ok(whole.map(|(rest, vectors)| Latent { vectors, ..rest.code.clone() }).collect())
     }
 
-    /// Log radiance at the latents' exposures on every pixel, 3·W·H values each.
+    /// The vectors of the encoder's posteriors' means for images without lights.
+    fn encode_rest(&self, grid: Equirect, images: &[&[f32]]) -> Result<Vec<Vec<[f32; 3]>>> {
+        let veni =
+            self.veni().ok_or_else(|| Error::invalid(format!("{}: this model has no encoder", self.name)))?;
+        Ok(veni.encode(grid, images)?.into_iter().map(|e| e.vectors).collect())
+    }
+
+    /// An image of log radiance as what the model's vectors describe of it, and what they do not.
+    ///
+    /// # Errors
+    /// As [`Item::split`](veni_data::Item::split).
+    pub fn without_lights<'a>(&self, grid: Equirect, image: &'a [f32]) -> Result<Rest<'a>> {
+        let lights = self.model.config().lights;
+        if lights == 0 {
+            return Ok(Rest { log_radiance: image.into(), code: Latent::default() });
+        }
+        let item = veni_data::Item::split_log(grid, image, lights)?;
+        let code = Latent { lights: item.lights, log_exposure: item.log_exposure, ..Latent::default() };
+        Ok(Rest { log_radiance: item.log_radiance.to_vec().into(), code })
+    }
+
+    /// Log radiance at the latents' exposures on every pixel, lights included, 3·W·H values each.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the model if a latent does not belong to it or is too large to decode.
@@ -159,6 +194,9 @@ impl LoadedModel {
         let directions = grid.directions();
         let one = |z: &Latent| {
             let field = field.condition(z).map_err(|e| Error::invalid(format!("{}: {e}", self.name)))?;
+            if !z.lights.is_empty() {
+                return Ok(field.bake(grid).into_flattened().into_iter().map(f32::ln).collect());
+            }
             let mut image = vec![[0.0; 3]; directions.len()];
             field.log_radiance_batch(&directions, &mut image);
             Ok(image.into_flattened())

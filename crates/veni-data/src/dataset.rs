@@ -53,10 +53,19 @@ impl Item {
             return Ok(Self::new(path, &panorama, grid));
         }
         let full = panorama.grid();
-        let light = LightOptions::of_codes(lights).of_pixels(full, panorama.into_pixels())?;
+        let light =
+            LightOptions { lights, ..LightOptions::default() }.of_pixels(full, panorama.into_pixels())?;
         let lights = light.lights().clone();
         let item = Self::new(path, &Panorama::new(full, light.into_residual()), grid);
         Ok(Self { lights: lights.scaled((-item.log_exposure).exp()), ..item })
+    }
+
+    /// [`Item::split`] of log radiance on `grid`, 3·W·H values. [`Item::log_exposure`] is what the rest lies above or below exposure 0.
+    ///
+    /// # Errors
+    /// As [`Item::split`].
+    pub fn split_log(grid: Equirect, log_radiance: &[f32], lights: usize) -> Result<Self> {
+        Self::split(Path::new(""), Panorama::from_log(grid, log_radiance.as_chunks().0), grid, lights)
     }
 
     /// File name without extension.

@@ -51,7 +51,7 @@ pub(crate) struct Encode {
     /// Take up to N compact lights (the sun, lamps) out of the panorama before it is encoded, and put them into the latent
     /// [default: as many as the model was trained without]
     #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8))]
-    lights: Option<u8>,
+    compact_lights: Option<u8>,
 
     /// Also write a PNG: panorama | reconstruction, one pair per row
     #[arg(long, value_name = "OUT.png")]
@@ -75,7 +75,7 @@ impl Encode {
         let overwrite = Overwrite::from(self.force);
         let outputs = self.outputs(overwrite)?;
         let loaded = source::model(&self.model)?;
-        let encoding = Encoding::new(&loaded, self.lights.map(usize::from))?;
+        let encoding = Encoding::new(&loaded, self.compact_lights.map(usize::from))?;
         let mut sheet =
             self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
         self.shard.note_idle(self.panoramas.len(), report);

@@ -7,6 +7,7 @@ use crate::fitting::FitSettings;
 use crate::{Error, Result};
 use veni_core::LoadedModel;
 use veni_light::latent::Latent;
+use veni_light::light::{CompactLight, Lights};
 use veni_light::sphere::Equirect;
 
 /// Where the optimisation of a latent starts.
@@ -58,7 +59,7 @@ impl Codec for Autoencoder<'_> {
     }
 
     fn dimension(&self) -> usize {
-        self.subject.dimension()
+        self.subject.dimension() + LIGHT * self.subject.model().config().lights
     }
 
     fn key(&self) -> Value {
@@ -66,11 +67,11 @@ impl Codec for Autoencoder<'_> {
     }
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
-        Ok(numbers(self.subject.encode(grid, &[image])?))
+        Ok(numbers(&self.subject.encode(grid, &[image])?))
     }
 
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>> {
-        Ok(self.subject.decode(grid, &[latent(code)])?.concat())
+        Ok(self.subject.decode(grid, &[latent(self.subject, code)])?.concat())
     }
 }
 
@@ -84,7 +85,7 @@ impl Codec for Optimised<'_> {
     }
 
     fn dimension(&self) -> usize {
-        self.subject.dimension()
+        self.subject.dimension() + LIGHT * self.subject.model().config().lights
     }
 
     fn key(&self) -> Value {
@@ -101,25 +102,49 @@ impl Codec for Optimised<'_> {
     }
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
-        let start = match self.start {
-            Start::Encoder => self.subject.encode(grid, &[image])?,
-            Start::Zero => vec![Latent::new(vec![[0.0; 3]; self.subject.latent_vectors()])],
+        let rest = self.subject.without_lights(grid, image)?;
+        let vectors = match self.start {
+            Start::Encoder => self.subject.encode(grid, &[image])?.remove(0).vectors,
+            Start::Zero => vec![[0.0; 3]; self.subject.latent_vectors()],
         };
-        let fitted = self.settings.fit(self.subject, grid, &[image], &start);
-        Ok(numbers(fitted.map_err(|e| Error::invalid(format!("{}: {e}", self.subject.name())))?.latents))
+        let fitted = self.settings.fit(self.subject, grid, &[&*rest.log_radiance], &[Latent::new(vectors)]);
+        let fitted = fitted.map_err(|e| Error::invalid(format!("{}: {e}", self.subject.name())))?.latents;
+        // the fit may have moved the exposure of the rest, which the lights do not share
+        let whole = |z: Latent| Latent { lights: rest.code.lights.scaled((-z.log_exposure).exp()), ..z };
+        Ok(numbers(&fitted.into_iter().map(whole).collect::<Vec<_>>()))
     }
 
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>> {
-        Ok(self.subject.decode(grid, &[latent(code)])?.concat())
+        Ok(self.subject.decode(grid, &[latent(self.subject, code)])?.concat())
     }
 }
 
-/// The coordinates of a single latent.
-fn numbers(latents: Vec<Latent>) -> Vec<f32> {
-    latents.into_iter().flat_map(|z| z.vectors).flatten().collect()
+/// The numbers of a light.
+const LIGHT: usize = 7;
+
+/// The coordinates of a single latent; then, of one with lights, whether the first is the sun, and seven numbers of each.
+fn numbers(latents: &[Latent]) -> Vec<f32> {
+    let mut all: Vec<f32> = latents.iter().flat_map(|z| z.vectors.iter().flatten().copied()).collect();
+    for lights in latents.iter().map(|z| &z.lights).filter(|lights| !lights.is_empty()) {
+        all.push(f32::from(u8::from(lights.sun().is_some())));
+        for CompactLight { direction, irradiance, radius, .. } in lights.iter() {
+            all.extend(direction.iter().chain(irradiance).chain([radius]));
+        }
+    }
+    all
 }
 
-/// A code's numbers as a latent.
-pub(crate) fn latent(code: &[f32]) -> Latent {
-    Latent::new(code.as_chunks().0.to_vec())
+/// A code's numbers as a latent of the model.
+pub(crate) fn latent(subject: &LoadedModel, code: &[f32]) -> Latent {
+    let (vectors, lights) = code.split_at(3 * subject.latent_vectors());
+    let light = |n: &[f32; LIGHT]| CompactLight::new([n[0], n[1], n[2]], [n[3], n[4], n[5]], n[6]);
+    let lights = match lights.split_first() {
+        Some((sun, rest)) => {
+            let mut lights = rest.as_chunks().0.iter().map(light);
+            let sun = if *sun > 0.0 { lights.next() } else { None };
+            Lights::new(sun, lights)
+        }
+        None => Lights::default(),
+    };
+    Latent { lights, ..Latent::new(vectors.as_chunks().0.to_vec()) }
 }

@@ -113,7 +113,8 @@ fn codec<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel) -> Box<dyn Codec + 
 
 fn ways(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<Vec<Way>> {
     let (grid, frames) = (run.data.grid(), run.settings.frames);
-    let latents: Vec<_> = codes(run, &*codec(run, subject))?.iter().map(|code| latent(code)).collect();
+    let latents: Vec<_> =
+        codes(run, &*codec(run, subject))?.iter().map(|code| latent(subject, code)).collect();
     let names: Vec<_> = run.data.items().iter().map(veni_data::Item::name).collect();
     let way = |(pair, names): (&[Latent], &[String])| {
         let at = |k: usize| k as f32 / (frames - 1) as f32;

@@ -12,7 +12,7 @@ use veni_core::train::presets::Preset;
 use veni_core::vae::Veni;
 use veni_data::{Dataset, Item};
 use veni_image::metrics::{Alignment, log_error, scores, spearman, weighted_log_error};
-use veni_light::model::{DecoderConfig, EncoderConfig, Model, ModelConfig, ModelInfo, ModelKind};
+use veni_light::model::{DecoderConfig, Model, ModelConfig, ModelInfo, ModelKind};
 use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 

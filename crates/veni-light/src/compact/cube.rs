@@ -1,8 +1,8 @@
-//! A disc on the texels of a cube map: its energy is right at any size.
+//! A disc on the texels of a cube map: its energy is right at any size. MODEL (72).
 
 use std::f64::consts::PI;
 
-use super::CompactLight;
+use super::{CompactLight, Glow};
 use crate::sphere::{CubeFace, Frame};
 
 /// Places along a side of a texel that the disc's edge crosses; more where the disc is smaller than a texel.
@@ -11,9 +11,23 @@ const PLACES: f64 = 16.0;
 const MOST_PLACES: f64 = 256.0;
 
 impl CompactLight {
-    /// What part of the light lies in which texel of a cube map of `size` whose faces are named by `frame`
-    /// ([`CubeFace::direction`]): indices face after face, row-major, ascending, and parts that sum to 1.
-    pub fn cube_parts(&self, frame: Frame, size: usize) -> Vec<(usize, f64)> {
+    /// What each texel of a cube map of `size` whose faces are named by `frame` ([`CubeFace::direction`]) gains from the light:
+    /// indices face after face, row-major, ascending, and radiance.
+    pub(super) fn on_cube(&self, frame: Frame, size: usize) -> Vec<(usize, [f32; 3])> {
+        if let Some(glow) = Glow::new(self) {
+            return glow_on_cube(&glow, frame, size);
+        }
+        let texel = |(index, part): (usize, f64)| {
+            let k = index % (size * size);
+            let mut gained = [0.0; 3];
+            self.add_part(part / CubeFace::solid_angle(size, k % size, k / size), &mut gained);
+            (index, gained)
+        };
+        self.cube_parts(frame, size).into_iter().map(texel).collect()
+    }
+
+    /// What part of the light, as a disc, lies in which texel: parts that sum to 1.
+    fn cube_parts(&self, frame: Frame, size: usize) -> Vec<(usize, f64)> {
         let towards = self.direction.map(f64::from);
         let half = (0.5 * f64::from(self.radius)).sin();
         let square = 4.0 * half * half;
@@ -60,6 +74,28 @@ impl CompactLight {
         parts.iter_mut().for_each(|part| part.1 /= total);
         parts
     }
+}
+
+/// The mean over each texel.
+fn glow_on_cube(glow: &Glow, frame: Frame, size: usize) -> Vec<(usize, [f32; 3])> {
+    let texel = 2.0 / size as f64;
+    let n = glow.places(texel);
+    let mut gains = Vec::new();
+    for (index, (face, row, column)) in texels(size).enumerate() {
+        let [a, b] = [column, row].map(|k| (k as f64 + 0.5) * texel - 1.0);
+        if glow.beyond(face.towards(frame, a, b), 2.0 * texel) {
+            continue;
+        }
+        let place = |k: usize| ((k as f64 + 0.5) / n as f64 - 0.5) * texel;
+        let places = (0..n * n).map(|k| {
+            let (a, b) = (a + place(k % n), b + place(k / n));
+            (face.towards(frame, a, b), (1.0 + a * a + b * b).powf(-1.5))
+        });
+        let mut gained = [0.0; 3];
+        glow.add_density(glow.mean(places), &mut gained);
+        gains.push((index, gained));
+    }
+    gains
 }
 
 /// Face, row and column of every texel.
@@ -117,5 +153,18 @@ mod tests {
         });
         let most = radiance.fold(0.0, f64::max);
         assert!((most / f64::from(light.radiance()[0]) - 1.0).abs() < 2e-3, "{most}");
+    }
+
+    #[test]
+    fn wide_lights_have_their_energy() {
+        for size in [4, 32] {
+            let light = CompactLight::new([0.6, 0.0, 0.8], [2.0, 1.0, 0.5], 0.3);
+            let mut sum = 0.0;
+            for (index, gained) in light.on_cube(Frame::Bevy, size) {
+                let k = index % (size * size);
+                sum += f64::from(gained[0]) * CubeFace::solid_angle(size, k % size, k / size);
+            }
+            assert!((sum / 2.0 - 1.0).abs() < 1e-3, "{size}: {sum}");
+        }
     }
 }

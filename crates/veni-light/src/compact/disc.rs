@@ -1,5 +1,5 @@
 //! A disc on the pixels of a panorama by exact coverage: its energy is right at any resolution, at the poles and across the
-//! seam. LIGHT (9).
+//! seam. LIGHT (9), MODEL (72).
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -162,6 +162,19 @@ impl CompactLight {
         assert_eq!(pixels.len(), grid.len(), "pixels of a {} × {} grid", grid.width, grid.height);
         for (index, part) in Disc::new(self.direction, self.radius).parts(grid) {
             self.add_part(part / grid.solid_angle(index / grid.width), &mut pixels[index]);
+        }
+    }
+
+    /// Adds the parts of the light, as a disc, that lie in `rows` of a panorama, which `pixels` are.
+    pub(super) fn add_to_rows(&self, grid: Equirect, rows: Range<usize>, pixels: &mut [[f32; 3]]) {
+        let disc = Disc::new(self.direction, self.radius);
+        let mut parts = Vec::new();
+        for row in disc.rows(grid, rows.clone()) {
+            disc.row_parts(grid, row, &mut parts);
+            let pixels = &mut pixels[(row - rows.start) * grid.width..][..grid.width];
+            for (column, part) in parts.drain(..) {
+                self.add_part(part / grid.solid_angle(row), &mut pixels[column]);
+            }
         }
     }
 

@@ -2,9 +2,9 @@
 
 use std::ops::{Deref, Range};
 
-use super::{CompactLight, Disc, RadiusSource};
+use super::{CompactLight, Glow, RadiusSource};
 use crate::limits::MAX_LIGHTS;
-use crate::sphere::{CubeFace, Equirect, Frame};
+use crate::sphere::{Equirect, Frame};
 use crate::{Error, Result};
 
 /// Lights further apart than this, radians, are not the same light of two scenes: 45°.
@@ -66,38 +66,25 @@ impl Lights {
         self.map(|light| CompactLight { irradiance: light.irradiance.map(|e| e * factor), ..light })
     }
 
-    /// Adds the parts of the lights, as discs, that lie in `rows` of a panorama; `pixels` are those rows.
+    /// Adds what of the lights lies in the pixels of `rows` of a panorama, which `pixels` are: of discs the exact part, of wider
+    /// lights, which are smooth lobes, the mean.
     ///
     /// # Panics
     /// If there are not as many pixels as the rows have.
     pub fn add_to_rows(&self, grid: Equirect, rows: Range<usize>, pixels: &mut [[f32; 3]]) {
         assert_eq!(pixels.len(), rows.len() * grid.width, "pixels of rows {rows:?}");
-        let mut parts = Vec::new();
         for light in &self.all {
-            let disc = Disc::new(light.direction, light.radius);
-            for row in disc.rows(grid, rows.clone()) {
-                disc.row_parts(grid, row, &mut parts);
-                let pixels = &mut pixels[(row - rows.start) * grid.width..][..grid.width];
-                for (column, part) in parts.drain(..) {
-                    light.add_part(part / grid.solid_angle(row), &mut pixels[column]);
-                }
+            match Glow::new(light) {
+                Some(glow) => glow.add_to_rows(grid, rows.clone(), pixels),
+                None => light.add_to_rows(grid, rows.clone(), pixels),
             }
         }
     }
 
-    /// What each texel of a cube map gains from the lights: indices, face after face, row-major and ascending for each light, and
-    /// radiance ([`CompactLight::cube_parts`]).
+    /// What each texel of a cube map whose faces are named by `frame` ([`CubeFace::direction`](crate::sphere::CubeFace::direction)) gains from the lights: indices,
+    /// face after face, row-major and ascending for each light, and radiance.
     pub fn on_cube(&self, frame: Frame, size: usize) -> Vec<(usize, [f32; 3])> {
-        let of_light = |light: &CompactLight| {
-            let texel = |(index, part): (usize, f64)| {
-                let k = index % (size * size);
-                let mut gained = [0.0; 3];
-                light.add_part(part / CubeFace::solid_angle(size, k % size, k / size), &mut gained);
-                (index, gained)
-            };
-            light.cube_parts(frame, size).into_iter().map(texel).collect::<Vec<_>>()
-        };
-        self.all.iter().flat_map(of_light).collect()
+        self.all.iter().flat_map(|light| light.on_cube(frame, size)).collect()
     }
 
     /// Between this at `t` = 0 and `other` at 1. The sun of one moves along the great circle to the sun of the other, another

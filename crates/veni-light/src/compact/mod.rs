@@ -2,9 +2,11 @@
 
 mod cube;
 mod disc;
+mod glow;
 mod lights;
 
 pub use disc::Disc;
+pub(crate) use glow::Glow;
 pub use lights::Lights;
 
 use std::fmt;
@@ -54,7 +56,7 @@ impl Kind {
     /// Largest angular radius of a disc, degrees.
     const DISC: f32 = 1.5;
     /// Largest angular radius of a glow, degrees.
-    pub(crate) const GLOW: f32 = 6.0;
+    const GLOW: f32 = 6.0;
 
     /// The kind of a light of this angular radius, radians.
     pub fn of(radius: f32) -> Self {
@@ -83,6 +85,47 @@ impl fmt::Display for Kind {
             Self::Glow => "glow",
             Self::Lobe => "lobe",
         })
+    }
+}
+
+/// A light as radiance in any direction: a disc, or of what is wider than one a smooth lobe. MODEL (72).
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Emitter {
+    /// Constant radiance where |d − u|² is at most a square: 4 sin²(r/2).
+    Disc {
+        direction: [f32; 3],
+        square: f32,
+        radiance: [f32; 3],
+    },
+    Glow(Glow),
+}
+
+impl Emitter {
+    /// None for a light without extent, which no direction meets.
+    pub(crate) fn new(light: &CompactLight) -> Option<Self> {
+        if let Some(glow) = Glow::new(light) {
+            return Some(Self::Glow(glow));
+        }
+        let half = (0.5 * f64::from(light.radius)).sin();
+        let (direction, radiance) = (light.direction, light.radiance());
+        let square = (4.0 * half * half) as f32;
+        radiance.iter().all(|v| v.is_finite()).then_some(Self::Disc { direction, square, radiance })
+    }
+
+    /// Adds the light to the radiance of a unit direction.
+    #[inline(always)]
+    pub(crate) fn add(&self, d: [f32; 3], sum: &mut [f32; 3]) {
+        match self {
+            Self::Disc { direction, square, radiance } => {
+                let apart: f32 = d.iter().zip(direction).map(|(d, u)| (d - u) * (d - u)).sum();
+                if apart <= *square {
+                    for (sum, own) in sum.iter_mut().zip(radiance) {
+                        *sum += own;
+                    }
+                }
+            }
+            Self::Glow(glow) => glow.add(d, sum),
+        }
     }
 }
 

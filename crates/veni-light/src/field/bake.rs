@@ -74,12 +74,12 @@ impl Field {
         directions: &[[f32; 3]],
         out: &mut [[f32; 3]],
         log: bool,
-        caps: bool,
+        lights: bool,
         scratch: &mut Aligned,
     ) {
         let (mlp, folded, arch) = (&self.weights.mlp, &*self.folded, pulp::Arch::new());
         let few = directions.len() <= FEW;
-        let work = Blocks { mlp, folded, directions, out, log, caps, scratch };
+        let work = Blocks { mlp, folded, directions, out, log, lights, scratch };
         if few { arch.dispatch(Single(work)) } else { arch.dispatch(work) }
     }
 

@@ -31,7 +31,7 @@ pub(super) struct Blocks<'a> {
     /// Log radiance instead of radiance.
     pub(super) log: bool,
     /// Whether radiance includes the lights.
-    pub(super) caps: bool,
+    pub(super) lights: bool,
     pub(super) scratch: &'a mut Aligned,
 }
 
@@ -40,7 +40,7 @@ impl WithSimd for Blocks<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { mlp, folded, directions, out, log, caps, scratch } = self;
+        let Self { mlp, folded, directions, out, log, lights, scratch } = self;
         let row = VECTORS * S::F32_LANES;
         let (hidden, widest) = (mlp.padded(), mlp.input.iter().map(|c| c.weight.inputs).max().unwrap_or(0));
         let scratch = scratch.at_least(row * (4 + hidden + hidden.max(widest) + PANEL));
@@ -64,9 +64,9 @@ impl WithSimd for Blocks<'_> {
             for (i, out) in out.iter_mut().enumerate() {
                 *out = [rgb[i], rgb[row + i], rgb[2 * row + i]];
             }
-            if !log && caps {
+            if !log && lights {
                 let both = directions.iter().zip(out.iter_mut());
-                both.for_each(|(d, out)| folded.caps.iter().for_each(|cap| cap.add(*d, out)));
+                both.for_each(|(d, out)| folded.emitters.iter().for_each(|light| light.add(*d, out)));
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Spherical Gaussians added to the network's output. MODEL (37).
+//! Spherical Gaussians added to the network's output. MODEL (71).
 
 use pulp::{Simd, bytemuck};
 

@@ -7,7 +7,7 @@
 //! 2. their sines and cosines at frequencies 1 and 4 and themselves, projected to h = 128 features x;
 //! 3. per layer x ← LN(x + a), x ← LN(x + W₂ max(0, W₁ x + b₁) + b₂), where a depends on the latent only;
 //! 4. log radiance = W x + b + the latent's lobes + its log exposure;
-//! 5. radiance = exp(log radiance) + the radiance of the latent's lights whose disc d is in.
+//! 5. radiance = exp(log radiance) + that of the latent's lights: discs, and smooth lobes of what is wider.
 //!
 //! All entry points give the same bits for the same direction: one direction, a batch, a baked panorama; but for the lights, of
 //! which a pixel holds the exact part that lies in it. Functions of log radiance leave the lights out. The kernels run at the
@@ -34,11 +34,10 @@ mod weights;
 
 use std::sync::Arc;
 
-use crate::compact::Lights;
+use crate::compact::{Emitter, Lights};
 use crate::latent::{Latent, Lobe};
 use crate::model::Model;
 use crate::{Error, Result};
-use lights::Cap;
 use weights::Weights;
 
 #[cfg(feature = "training")]
@@ -79,8 +78,8 @@ struct Folded {
     lobes: Vec<Lobe>,
     /// In units of radiance: exposure included.
     lights: Lights,
-    /// The lights as what a direction meets.
-    caps: Vec<Cap>,
+    /// The lights as what is asked for a direction.
+    emitters: Vec<Emitter>,
     log_exposure: f32,
 }
 
@@ -154,7 +153,7 @@ impl Decoder {
         let lights = latent.lights.scaled(latent.log_exposure.exp());
         let folded = Folded {
             lobes: latent.lobes.clone(),
-            caps: caps(&lights),
+            emitters: emitters(&lights),
             lights,
             vectors: latent.vectors.iter().map(|[x, y, _]| [*x, *y]).collect(),
             no_bias: vec![0.0; weights.mlp.padded()],
@@ -209,13 +208,13 @@ impl Field {
 
 impl Folded {
     fn set_lights(&mut self, lights: Lights) {
-        self.caps = caps(&lights);
+        self.emitters = emitters(&lights);
         self.lights = lights;
     }
 }
 
-fn caps(lights: &Lights) -> Vec<Cap> {
-    lights.iter().filter_map(Cap::new).collect()
+fn emitters(lights: &Lights) -> Vec<Emitter> {
+    lights.iter().filter_map(Emitter::new).collect()
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ impl WithSimd for Single<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self(Blocks { mlp, folded, directions, out, log, caps, scratch }) = self;
+        let Self(Blocks { mlp, folded, directions, out, log, lights, scratch }) = self;
         let (inputs, padded) = (5 * (folded.vectors.len() + 2), mlp.padded());
         let all = &mut scratch.at_least(inputs + 2 * padded)[..inputs + 2 * padded];
         // what is padding must be 0
@@ -36,8 +36,8 @@ impl WithSimd for Single<'_> {
                 let value = value + folded.log_exposure;
                 if log { value } else { first(math::exp(simd, simd.splat_f32s(value))) }
             });
-            if !log && caps {
-                folded.caps.iter().for_each(|cap| cap.add(*direction, out));
+            if !log && lights {
+                folded.emitters.iter().for_each(|light| light.add(*direction, out));
             }
         }
     }

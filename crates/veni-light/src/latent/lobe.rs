@@ -1,4 +1,4 @@
-//! A spherical Gaussian of log radiance: detail where the vectors of a code do not reach. MODEL (37).
+//! A spherical Gaussian of log radiance: detail where the vectors of a code do not reach. MODEL (71).
 
 use crate::limits::MAX_LOBES;
 use crate::{Error, Result};

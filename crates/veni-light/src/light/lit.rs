@@ -6,7 +6,7 @@ use super::luminance::luminance;
 use super::sh::Sh;
 use std::f32::consts::PI;
 
-use crate::compact::{CompactLight, Kind, Lights, RadiusSource};
+use crate::compact::{CompactLight, Lights, RadiusSource};
 use crate::field::Field;
 use crate::sphere::Equirect;
 use crate::{Error, Result};
@@ -73,11 +73,6 @@ impl Default for LightOptions {
 impl LightOptions {
     /// The most lights that are taken out; so many are always looked for.
     pub const MOST: usize = Lights::MOST;
-
-    /// What a latent has beside its vectors: up to `lights` of at most 6°. The field describes what is wider.
-    pub fn of_codes(lights: usize) -> Self {
-        Self { lights, widest: Kind::GLOW.to_radians(), ..Self::default() }
-    }
 
     /// The light of row-major `pixels`, which become the residual: no copy is made.
     ///

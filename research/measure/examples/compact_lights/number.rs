@@ -14,18 +14,23 @@ use super::panorama;
 
 const GRID: Equirect = Equirect { width: 128, height: 64 };
 const NUMBERS: [usize; 5] = [0, 1, 2, 4, 8];
+/// Largest angular radii, degrees.
+const WIDEST: [f32; 4] = [1.5, 3.0, 6.0, 180.0];
 
 pub(crate) fn run(files: &[&str]) -> Result<()> {
     let model = Model::pretrained();
     let encoder = Encoder::new(&model)?;
-    println!("| lights | whole encoded, lights added | residual encoded, lights added | worst of these |");
-    println!("|---|---|---|---|");
-    for most in NUMBERS {
+    println!(
+        "| lights | of at most | whole encoded, lights added | residual encoded, lights added | worst of these |"
+    );
+    println!("|---|---|---|---|---|");
+    for (most, widest) in NUMBERS.into_iter().flat_map(|most| WIDEST.map(|widest| (most, widest))) {
         let errors = files
             .par_iter()
             .map(|file| {
                 let whole = panorama(file)?;
-                let options = LightOptions { lights: most, ..LightOptions::default() };
+                let options =
+                    LightOptions { lights: most, widest: widest.to_radians(), ..LightOptions::default() };
                 let light = options.of(whole.environment()?)?;
                 let residual = Panorama::new(whole.grid(), light.residual().pixels().to_vec());
                 let error = |encoded: &Panorama| -> Result<f64> {
@@ -37,7 +42,7 @@ pub(crate) fn run(files: &[&str]) -> Result<()> {
             .collect::<Result<Vec<_>>>()?;
         let rms = |k: usize| (errors.iter().map(|e| e[k] * e[k]).sum::<f64>() / errors.len() as f64).sqrt();
         let worst = errors.iter().map(|e| e[1]).fold(0.0, f64::max);
-        println!("| {most} | {:.3} | {:.3} | {worst:.3} |", rms(0), rms(1));
+        println!("| {most} | {widest}° | {:.3} | {:.3} | {worst:.3} |", rms(0), rms(1));
     }
     Ok(())
 }

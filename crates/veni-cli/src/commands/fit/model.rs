@@ -50,6 +50,11 @@ impl FitModel {
         self.model.prior()
     }
 
+    /// So many lights were taken out of the panoramas that it was trained on.
+    pub(super) fn lights(&self) -> usize {
+        self.model.config().lights
+    }
+
     pub(super) fn latent_vectors(&self) -> usize {
         self.model.latent_vectors()
     }
@@ -73,11 +78,17 @@ impl FitModel {
         }
     }
 
-    /// Log radiance at the latent's exposure on every pixel, 3·W·H values.
+    /// Log radiance at the latent's exposure on every pixel, lights included, 3·W·H values.
     pub(super) fn decode(&self, grid: Equirect, latent: &Latent) -> Result<Vec<f32>> {
         let decoded = self.decoder().in_directions(grid.directions()).forward(std::slice::from_ref(latent));
         let decoded = decoded.map_err(|e| e.in_file(&self.name))?;
-        Ok(decoded.into_iter().map(|v| v as f32).collect())
+        let log: Vec<f32> = decoded.into_iter().map(|v| v as f32).collect();
+        if latent.lights.is_empty() {
+            return Ok(log);
+        }
+        let mut radiance: Vec<_> = log.as_chunks::<3>().0.iter().map(|p| p.map(f32::exp)).collect();
+        latent.lights.scaled(latent.log_exposure.exp()).add_to_rows(grid, 0..grid.height, &mut radiance);
+        Ok(radiance.into_flattened().into_iter().map(f32::ln).collect())
     }
 
     /// The best of the fits from every start.

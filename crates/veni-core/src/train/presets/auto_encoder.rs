@@ -7,7 +7,6 @@ use crate::train::loss::LossConfig;
 use crate::train::optimiser::AdamConfig;
 use veni_data::{AugmentConfig, DataConfig};
 use veni_fit::schedule::{LearningRate, WeightSchedule};
-use veni_light::light::Lights;
 use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig, ModelKind};
 
 /// Augmentation that keeps a sky a sky; chosen for a training set of some dozens.
@@ -56,7 +55,7 @@ pub(super) fn small(latent_vectors: usize) -> TrainConfig {
         ema_decay: 0.999,
         model: ModelConfig {
             kind: ModelKind::Veni,
-            lights: Lights::MOST,
+            lights: 0,
             latent_vectors,
             decoder: DecoderConfig::default(),
             encoder: Some(EncoderConfig {

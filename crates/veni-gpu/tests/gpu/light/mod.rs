@@ -78,7 +78,7 @@ impl<'a> Cpu<'a> {
         let sampler = Sampler::new(EnvironmentMap::new(GRID, pixels).unwrap()).turned(turn);
         let sampler = if sky.density == LightDensity::Compensated { sampler.compensated() } else { sampler };
         match sky.light.sun() {
-            Some(sun) => Self::Split(SplitSampler::new(sun.turned(turn), sampler)),
+            Some(sun) => Self::Split(SplitSampler::new(sun.turned(f64::from(turn)), sampler)),
             None => Self::Map(sampler),
         }
     }

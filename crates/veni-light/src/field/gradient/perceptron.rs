@@ -82,7 +82,7 @@ impl Perceptron {
             shift: added[1..].iter().map(|shift| shift.to_vec()).collect(),
             lobes: Vec::new(),
             lights: Lights::default(),
-            caps: Vec::new(),
+            emitters: Vec::new(),
             log_exposure: 0.0,
         })
     }
@@ -110,7 +110,7 @@ impl Perceptron {
                     directions,
                     out,
                     log: true,
-                    caps: false,
+                    lights: false,
                     scratch,
                 });
             },

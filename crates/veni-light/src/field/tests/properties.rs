@@ -183,7 +183,7 @@ fn every_simd_width_gives_the_same_result() {
             let mut out = vec![[0.0; 3]; self.1.len()];
             let (mlp, folded) = (&self.0.weights.mlp, &*self.0.folded);
             let scratch = &mut Aligned::default();
-            Blocks { mlp, folded, directions: self.1, out: &mut out, log: true, caps: false, scratch }
+            Blocks { mlp, folded, directions: self.1, out: &mut out, log: true, lights: false, scratch }
                 .with_simd(simd);
             out
         }

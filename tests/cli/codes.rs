@@ -1,0 +1,122 @@
+//! Codes with lights: encoded, fitted, baked in every layout, read again.
+
+use serde_json::Value;
+
+use crate::util::{Dir, panoramas, text};
+use veni_image::{Panorama, ReadOptions};
+use veni_light::latent::Latent;
+use veni_light::light::CompactLight;
+use veni_light::sphere::CubeFace;
+
+/// A sunny panorama, its measured sun by `light`, and what an encoded code says of it.
+fn encoded(dir: &Dir) -> (Value, Latent) {
+    let file = text(&panoramas().join("val/garden_nook.exr"));
+    let [measured] = &dir.json(&["light", &file])[..] else { panic!("one object") };
+    let said = dir.ok(&["encode", &file, "--compact-lights", "1", "-o", "sky.json"]);
+    assert!(said.contains("vectors, the sun, exposure"), "{said}");
+    (measured.clone(), Latent::load(dir.path("sky.json")).unwrap())
+}
+
+fn sums(file: &std::path::Path) -> [f64; 3] {
+    Panorama::read(file).unwrap().environment().unwrap().integral()
+}
+
+fn close(a: [f64; 3], b: [f64; 3], tolerance: f64) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a / b - 1.0).abs() < tolerance)
+}
+
+#[test]
+fn the_sun_of_a_panorama_is_in_its_code_and_its_energy_in_every_picture() {
+    let dir = Dir::new();
+    let (measured, latent) = encoded(&dir);
+    let sun = latent.lights.sun().expect("a sun");
+    for (k, own) in sun.direction.iter().enumerate() {
+        assert!((f64::from(*own) - measured["sun"]["direction"][k].as_f64().unwrap()).abs() < 1e-6);
+        let irradiance = f64::from(sun.irradiance[k]) * f64::from(latent.log_exposure).exp();
+        let expected = measured["sun"]["irradiance"][k].as_f64().unwrap();
+        assert!((irradiance / expected - 1.0).abs() < 1e-4, "{irradiance} {expected}");
+    }
+    let raw = std::fs::read_to_string(dir.path("sky.json")).unwrap();
+    assert!(raw.contains("\"format\":2") && raw.contains("\"sun\":{"), "{raw}");
+    // without its lights the same code is one of format 1
+    let plain = Latent { lights: veni_light::light::Lights::default(), ..latent.clone() };
+    std::fs::write(dir.path("plain.json"), plain.to_json().unwrap()).unwrap();
+    let factor = latent.log_exposure.exp();
+    let own = sun.irradiance.map(|e| f64::from(e * factor));
+    let baked = |latent: &str, out: &str, more: &[&str]| {
+        dir.ok(&[&["bake", latent, "-o", out, "--float"], more].concat());
+        dir.path(out)
+    };
+    for size in ["64x32", "512x256"] {
+        let lit = sums(&baked("sky.json", &format!("{size}.exr"), &["--size", size]));
+        let rest = sums(&baked("plain.json", &format!("{size}-plain.exr"), &["--size", size]));
+        assert!(close([0, 1, 2].map(|c| lit[c] - rest[c]), own, 1e-3), "{size}: {lit:?} {rest:?} {own:?}");
+    }
+    // the faces of a cube map hold as much
+    let cube = |latent: &str, out: &str| -> [f64; 3] {
+        let path = baked(latent, out, &["--size", "32", "--layout", "cubemap"]);
+        let options = ReadOptions { any_aspect: true, ..ReadOptions::default() };
+        let faces = Panorama::read_with(&path, &options).unwrap();
+        let mut sum = [0.0; 3];
+        for (index, pixel) in faces.pixels().iter().enumerate() {
+            let area = CubeFace::solid_angle(32, index % 32, index / 32 % 32);
+            sum = [0, 1, 2].map(|c| sum[c] + area * f64::from(pixel[c]));
+        }
+        sum
+    };
+    let (lit, rest) = (cube("sky.json", "c.exr"), cube("plain.json", "cp.exr"));
+    assert!(close([0, 1, 2].map(|c| lit[c] - rest[c]), own, 1e-3), "{lit:?} {rest:?} {own:?}");
+    // a baked file gives back the code, lights included, and turns with it
+    dir.ok(&["bake", "512x256.exr", "--turn", "90", "-o", "turned.exr"]);
+    let [turned] = &dir.json(&["light", "turned.exr"])[..] else { panic!("one object") };
+    let azimuth = (turned["sun"]["azimuth"].as_f64().unwrap() - f64::from(sun.azimuth().to_degrees()))
+        .rem_euclid(360.0);
+    assert!((azimuth - 90.0).abs() < 0.5, "{azimuth}: {turned}");
+}
+
+#[test]
+fn a_fit_keeps_the_sun_and_says_where_it_cannot() {
+    let dir = Dir::new();
+    let (_, expected) = encoded(&dir);
+    let file = text(&panoramas().join("val/garden_nook.exr"));
+    dir.ok(&[
+        "fit",
+        &file,
+        "--compact-lights",
+        "1",
+        "--steps",
+        "5",
+        "-o",
+        "fit.json",
+        "--completed",
+        "all.exr",
+    ]);
+    let fitted = Latent::load(dir.path("fit.json")).unwrap();
+    let (a, b) = (fitted.lights.sun().unwrap(), expected.lights.sun().unwrap());
+    assert_eq!(a.direction, b.direction);
+    let absolute = |latent: &Latent, light: &CompactLight| light.irradiance[1] * latent.log_exposure.exp();
+    assert!((absolute(&fitted, a) / absolute(&expected, b) - 1.0).abs() < 1e-3);
+    for (args, says) in [
+        (&["fit", &file, "--compact-lights", "1", "--fov", "60"][..], "cannot be used with '--fov"),
+        (&["encode", &file, "--compact-lights", "9"], "9 is not in 0..=8"),
+    ] {
+        let run = dir.run(args);
+        assert!(run.code == Some(2) && run.err.contains(says), "{args:?}: {}", run.err);
+    }
+}
+
+#[test]
+fn damaged_lights_are_refused_by_name() {
+    let dir = Dir::new();
+    encoded(&dir);
+    let good = std::fs::read_to_string(dir.path("sky.json")).unwrap();
+    for (from, to, says) in [
+        ("\"radius\":", "\"radius\":-", "light 0: its radius"),
+        ("\"irradiance\":[", "\"irradiance\":[-", "light 0: its irradiance"),
+        ("\"sun\":{", "\"sun\":{\"colour\":1,", "colour"),
+        ("\"format\":2", "\"format\":7", "formats 1 and 2"),
+    ] {
+        std::fs::write(dir.path("bad.json"), good.replacen(from, to, 1)).unwrap();
+        dir.refused(&["bake", "bad.json", "-o", "x.exr"], &[says, "bad.json"]);
+    }
+}
