@@ -130,7 +130,8 @@ impl Lights {
         }
         for (at, light) in self.all.iter().enumerate() {
             let square: f32 = light.direction.iter().map(|c| c * c).sum();
-            let wrong = if !((square - 1.0).abs() < 1e-3) {
+            let unit = (square - 1.0).abs() < 1e-3;
+            let wrong = if !unit {
                 format!("direction {:?} is not of length 1", light.direction)
             } else if !light.irradiance.iter().all(|e| e.is_finite() && *e >= 0.0) {
                 format!("irradiance {:?} is not finite and positive", light.irradiance)

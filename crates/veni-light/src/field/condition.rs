@@ -29,6 +29,7 @@ impl Invariant {
 
     /// (1/r) daₑ/dr: what a gradient with respect to aₑ is multiplied by, along with x and y, to be one by x and y.
     /// Smooth at r = 0. Below the guard of the reference forms |k| counts as a constant, as there.
+    #[cfg(feature = "gradients")]
     pub(super) fn derivative(&self, r: f64) -> [f64; 2] {
         let w = self.scale;
         std::array::from_fn(|e| {

@@ -1,9 +1,11 @@
 //! The residual perceptron that runs for every direction, packed for the kernels.
 
+#[cfg(feature = "gradients")]
 use std::sync::OnceLock;
 
 use super::aligned::Aligned;
 use super::bfloat16::{Bfloat16, Pairs};
+#[cfg(feature = "gradients")]
 use super::gradient::Transposed;
 
 /// Outputs per panel: what one register tile computes.
@@ -45,6 +47,7 @@ impl Matrix {
         self.pairs = Some(Pairs::new(token, self.inputs, self.rows()));
     }
 
+    #[cfg(feature = "gradients")]
     /// The transpose of the first `outputs` columns, multiplied as this one is.
     pub(super) fn transposed(&self, outputs: usize) -> Self {
         let at = |k: usize, o: usize| self.rows()[o / PANEL * self.inputs + k][o % PANEL];
@@ -98,6 +101,7 @@ pub(super) struct Mlp {
     pub(super) output: Matrix,
     pub(super) output_bias: Vec<f32>,
     /// Made when the first gradient is asked for.
+    #[cfg(feature = "gradients")]
     transposed: OnceLock<Transposed>,
 }
 
@@ -127,6 +131,7 @@ impl Mlp {
             layers: (0..layers).map(layer).collect(),
             output: Matrix::new(tensor("output.weight"), 3),
             output_bias: padded("output.bias"),
+            #[cfg(feature = "gradients")]
             transposed: OnceLock::new(),
         }
     }
@@ -136,15 +141,21 @@ impl Mlp {
     pub(super) fn in_bfloat16(mut self, token: Bfloat16) -> Self {
         let maps = self.layers.iter_mut().flat_map(|layer| [&mut layer.ff1, &mut layer.ff2]);
         self.input.iter_mut().map(|chunk| &mut chunk.weight).chain(maps).for_each(|m| m.round(token));
-        Self { transposed: OnceLock::new(), ..self }
+        #[cfg(feature = "gradients")]
+        {
+            self.transposed = OnceLock::new();
+        }
+        self
     }
 
+    #[cfg(feature = "gradients")]
     /// Whether matrices but for the output's are multiplied in bfloat16, and the sums that are gradients by them added so.
     pub(super) fn bfloat16(&self) -> Option<Bfloat16> {
         self.input.first()?.weight.pairs.as_ref().map(Pairs::token)
     }
 
     /// The matrices the other way round.
+    #[cfg(feature = "gradients")]
     pub(super) fn transposed(&self) -> &Transposed {
         self.transposed.get_or_init(|| Transposed::new(self))
     }

@@ -23,6 +23,7 @@ pub(crate) mod bfloat16;
 mod block;
 mod condition;
 mod evaluator;
+#[cfg(feature = "gradients")]
 pub(crate) mod gradient;
 mod lights;
 mod lobes;
@@ -44,6 +45,7 @@ use weights::Weights;
 pub mod training;
 
 pub use evaluator::Evaluator;
+#[cfg(feature = "gradients")]
 pub use gradient::{Gradient, LocalQuadratic, Moments, NormalEquations};
 pub use rate::multiply_add_rate;
 

@@ -1,7 +1,9 @@
 //! A decoder's weights in the order that conditioning and kernels read them. Packed once per model.
 
+#[cfg(feature = "gradients")]
 use std::sync::OnceLock;
 
+#[cfg(feature = "gradients")]
 use super::gradient::ValueOutput;
 use super::mlp::{Mlp, PANEL};
 use crate::model::{Model, VnReluForm};
@@ -43,6 +45,7 @@ pub(super) struct Weights {
     pub(super) input_bias: Vec<f32>,
     pub(super) mlp: Mlp,
     /// Made when the first normal equations are asked for.
+    #[cfg(feature = "gradients")]
     value_output: OnceLock<Vec<ValueOutput>>,
 }
 
@@ -69,11 +72,13 @@ impl Weights {
             attention: (0..config.decoder.layers).map(attention).collect(),
             input_bias,
             mlp: Mlp::new(config.decoder.hidden, config.decoder.layers, tensor),
+            #[cfg(feature = "gradients")]
             value_output: OnceLock::new(),
         }
     }
 
     /// The two linear maps of every layer's attention in one.
+    #[cfg(feature = "gradients")]
     pub(super) fn value_output(&self) -> &[ValueOutput] {
         self.value_output
             .get_or_init(|| self.attention.iter().map(|a| ValueOutput::new(&a.value, &a.out)).collect())

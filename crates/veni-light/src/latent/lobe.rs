@@ -51,7 +51,8 @@ impl Lobe {
         }
         for (at, lobe) in lobes.iter().enumerate() {
             let square: f32 = lobe.direction.iter().map(|c| c * c).sum();
-            let wrong = if !((square - 1.0).abs() < 1e-3) {
+            let unit = (square - 1.0).abs() < 1e-3;
+            let wrong = if !unit {
                 format!("direction {:?} is not of length 1", lobe.direction)
             } else if !lobe.amplitude.iter().all(|a| a.is_finite()) {
                 format!("amplitude {:?} is not finite", lobe.amplitude)

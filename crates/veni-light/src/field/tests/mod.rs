@@ -1,9 +1,12 @@
 //! The field against the golden files, against a plain f64 implementation, and against its symmetries.
 
 mod golden;
+#[cfg(feature = "gradients")]
 mod gradient;
 mod lights;
+#[cfg(feature = "gradients")]
 mod moments;
+#[cfg(feature = "gradients")]
 mod normal;
 mod properties;
 mod reference;

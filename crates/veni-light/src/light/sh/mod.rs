@@ -4,6 +4,7 @@
 mod basis;
 mod convention;
 mod pixels;
+#[cfg(feature = "gradients")]
 mod pull_back;
 mod rotation;
 mod window;
@@ -12,10 +13,13 @@ use std::f64::consts::PI;
 
 use super::environment::EnvironmentMap;
 use crate::compact::CompactLight;
+use crate::field::Field;
+use crate::sphere::Equirect;
 use crate::{Error, Result};
 
 pub use basis::Basis;
 pub use pixels::pixel_integrals;
+#[cfg(feature = "gradients")]
 pub use pull_back::pull_back_irradiance;
 pub use window::Windowed;
 
@@ -59,6 +63,11 @@ impl<const L: usize> Sh<L> {
     /// The projection of a map, each pixel an area of constant radiance: c_lm = Σ L ∫ Y_lm dω over the pixel.
     pub fn of(map: EnvironmentMap<'_>) -> Self {
         pixels::Integrals::new(map.grid(), L).project(map.pixels())
+    }
+
+    /// The coefficients of a field, decoded at the pixels of `grid`.
+    pub fn of_field(field: &Field, grid: Equirect) -> Self {
+        pixels::Integrals::new(grid, L).project(&field.bake(grid))
     }
 
     /// A disc of constant radiance, in closed form; of a radius of 0 a point. With E = E⊥, c = cos r:

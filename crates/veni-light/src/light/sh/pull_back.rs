@@ -6,11 +6,6 @@ use crate::field::{Field, Gradient};
 use crate::sphere::Equirect;
 
 impl<const L: usize> Sh<L> {
-    /// The coefficients of a field, decoded at the pixels of `grid`.
-    pub fn of_field(field: &Field, grid: Equirect) -> Self {
-        Integrals::new(grid, L).project(&field.bake(grid))
-    }
-
     /// The gradient with respect to the latent of Σ ∂_lm c_lm, where `self` holds ∂, the derivative of some loss with respect to
     /// every coefficient of [`Sh::of_field`] on this grid: the coefficients are linear in radiance, and radiance has
     /// [`Field::gradient`]. The gradient's `loss` is that sum.

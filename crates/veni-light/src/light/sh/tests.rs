@@ -259,7 +259,7 @@ fn wrong_coefficients_are_refused() {
     assert!(Sh::<2>::new(nine).unwrap_err().to_string().contains("coefficient 4"));
 }
 
-#[cfg(feature = "pretrained")]
+#[cfg(all(feature = "pretrained", feature = "gradients"))]
 mod of_a_field {
     use super::super::pull_back_irradiance;
     use super::*;
