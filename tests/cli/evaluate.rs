@@ -136,6 +136,11 @@ fn every_protocol_runs_and_paper_runs_them_all() {
     let [sizes] = &dir.json(&args("dataset-size", &data, &[]))[..] else { panic!("one table") };
     assert_eq!(sizes["rows"][0]["Training panoramas"], 8.0);
     assert_eq!(kept(&dir), results);
+    // what the paper does not measure
+    let [light] = &dir.json(&args("light", &data, &[]))[..] else { panic!("one table") };
+    let error = light["rows"][0]["E error"].as_f64().unwrap();
+    assert!(error > 0.1 && error < 5.0, "{light}");
+    assert_eq!(kept(&dir), results);
     for figure in ["dataset-size.png", "equivariance.png"] {
         assert!(image::open(dir.path("eval/figures").join(figure)).is_ok(), "{figure}");
     }

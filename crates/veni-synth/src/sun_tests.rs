@@ -36,7 +36,7 @@ fn looks(sky: SkyKind, count: u64) -> Vec<(bool, Option<(f64, bool)>)> {
         }
         (
             peak > 20.0 * around,
-            light.sun().map(|sun| (degrees(sun.direction, scene.sun()), sun.kind == Kind::Disc)),
+            light.sun().map(|sun| (degrees(sun.direction, scene.sun()), sun.kind() == Kind::Disc)),
         )
     };
     (0..count).into_par_iter().map(look).collect()

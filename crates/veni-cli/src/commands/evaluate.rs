@@ -13,7 +13,7 @@ use veni_eval::codec::Codec;
 use veni_eval::lpips::{self, Lpips};
 use veni_eval::protocol::{
     Evaluation, Published, Report as Findings, Settings, Share, ablations, consistency, dataset_size,
-    equivariance, interpolation, inverse_rendering, paper, reconstruction, uniqueness,
+    equivariance, interpolation, inverse_rendering, light, paper, reconstruction, uniqueness,
 };
 use veni_eval::store::Store;
 use veni_eval::table::{Format, Table};
@@ -144,9 +144,11 @@ pub(crate) enum Protocol {
     DatasetSize,
     /// Models that differ in one part, side by side
     Ablations,
+    /// Irradiance and the sun of decoded panoramas against the panoramas' own
+    Light,
     /// The light on a rendered ball (inverse rendering), from dull to shiny
     InverseRendering,
-    /// All of them, with published numbers to compare with
+    /// All of them but light, with published numbers to compare with
     Paper,
 }
 
@@ -281,6 +283,7 @@ impl Protocol {
             Self::Equivariance => equivariance::run(evaluation),
             Self::DatasetSize => dataset_size::run(evaluation),
             Self::Ablations => ablations::run(evaluation),
+            Self::Light => light::run(evaluation),
             Self::InverseRendering => inverse_rendering::run(evaluation),
             Self::Paper => paper::run(evaluation, published),
         }
@@ -296,6 +299,7 @@ impl Protocol {
             Self::Equivariance => Ok(()),
             Self::DatasetSize => dataset_size::keep(evaluation, share),
             Self::Ablations => ablations::keep(evaluation, share),
+            Self::Light => light::keep(evaluation, share),
             Self::InverseRendering => inverse_rendering::keep(evaluation, share),
             Self::Paper => paper::keep(evaluation, share),
         }

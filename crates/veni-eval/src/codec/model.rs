@@ -110,7 +110,11 @@ impl Codec for Optimised<'_> {
         let fitted = self.settings.fit(self.subject, grid, &[&*rest.log_radiance], &[Latent::new(vectors)]);
         let fitted = fitted.map_err(|e| Error::invalid(format!("{}: {e}", self.subject.name())))?.latents;
         // the fit may have moved the exposure of the rest, which the lights do not share
-        let whole = |z: Latent| Latent { lights: rest.code.lights.scaled((-z.log_exposure).exp()), ..z };
+        let whole = |z: Latent| Latent {
+            lights: rest.code.lights.scaled((-z.log_exposure).exp()),
+            log_exposure: z.log_exposure + rest.code.log_exposure,
+            ..z
+        };
         Ok(numbers(&fitted.into_iter().map(whole).collect::<Vec<_>>()))
     }
 
@@ -122,12 +126,13 @@ impl Codec for Optimised<'_> {
 /// The numbers of a light.
 const LIGHT: usize = 7;
 
-/// The coordinates of a single latent; then, of one with lights, whether the first is the sun, and seven numbers of each.
+/// The coordinates of a single latent; then, of one with lights, its log exposure, whether the first light is the sun, and seven
+/// numbers of each.
 fn numbers(latents: &[Latent]) -> Vec<f32> {
     let mut all: Vec<f32> = latents.iter().flat_map(|z| z.vectors.iter().flatten().copied()).collect();
-    for lights in latents.iter().map(|z| &z.lights).filter(|lights| !lights.is_empty()) {
-        all.push(f32::from(u8::from(lights.sun().is_some())));
-        for CompactLight { direction, irradiance, radius, .. } in lights.iter() {
+    for z in latents.iter().filter(|z| !z.lights.is_empty()) {
+        all.extend([z.log_exposure, f32::from(u8::from(z.lights.sun().is_some()))]);
+        for CompactLight { direction, irradiance, radius, .. } in z.lights.iter() {
             all.extend(direction.iter().chain(irradiance).chain([radius]));
         }
     }
@@ -138,13 +143,9 @@ fn numbers(latents: &[Latent]) -> Vec<f32> {
 pub(crate) fn latent(subject: &LoadedModel, code: &[f32]) -> Latent {
     let (vectors, lights) = code.split_at(3 * subject.latent_vectors());
     let light = |n: &[f32; LIGHT]| CompactLight::new([n[0], n[1], n[2]], [n[3], n[4], n[5]], n[6]);
-    let lights = match lights.split_first() {
-        Some((sun, rest)) => {
-            let mut lights = rest.as_chunks().0.iter().map(light);
-            let sun = if *sun > 0.0 { lights.next() } else { None };
-            Lights::new(sun, lights)
-        }
-        None => Lights::default(),
-    };
-    Latent { lights, ..Latent::new(vectors.as_chunks().0.to_vec()) }
+    let plain = Latent::new(vectors.as_chunks().0.to_vec());
+    let [log_exposure, sun, lights @ ..] = lights else { return plain };
+    let mut lights = lights.as_chunks().0.iter().map(light);
+    let sun = if *sun > 0.0 { lights.next() } else { None };
+    Latent { lights: Lights::new(sun, lights), log_exposure: *log_exposure, ..plain }
 }

@@ -9,8 +9,9 @@
 //! | [`equivariance`] | does the latent turn with the panorama? |
 //! | [`dataset_size`] | what is more training data worth? |
 //! | [`ablations`] | what is each part of the model worth? |
+//! | [`light`] | does what is decoded light things as the panorama does? |
 //! | [`inverse_rendering`] | what does the rendered image of a ball tell of the light on it? |
-//! | [`paper`] | all of them, with published numbers beside ours |
+//! | [`paper`] | all of them but `light`, with published numbers beside ours |
 //!
 //! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image; a
 //! [`Share`] of it can be computed beforehand, elsewhere.
@@ -21,6 +22,7 @@ pub mod dataset_size;
 pub mod equivariance;
 pub mod interpolation;
 pub mod inverse_rendering;
+pub mod light;
 pub mod paper;
 mod published;
 mod quality;

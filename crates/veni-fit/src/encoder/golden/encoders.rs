@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use veni_light::model::{Array, DecoderConfig, Model, ModelConfig, ModelInfo, ModelKind, decoder_schema};
+use veni_light::model::{Array, DecoderConfig, Model, ModelConfig, ModelInfo, decoder_schema};
 
 use super::case::{Case, Data};
 use super::official::{Official, line_directions};
