@@ -42,6 +42,9 @@ pub struct LossConfig {
     pub hdr_mse: WeightSchedule,
     /// Mean squared error of display values.
     pub ldr_mse: WeightSchedule,
+    /// Mean squared error of the logarithm of irradiance, on surfaces that face 26 ways.
+    #[serde(skip_serializing_if = "WeightSchedule::is_off")]
+    pub irradiance: WeightSchedule,
 }
 
 impl Default for LossConfig {
@@ -59,6 +62,7 @@ impl Default for LossConfig {
             log_mse: constant(0.0),
             hdr_mse: constant(0.0),
             ldr_mse: constant(0.0),
+            irradiance: constant(0.0),
         }
     }
 }

@@ -1,3 +1,3 @@
 //! The scripts behind the tables of docs/results are in `examples/`.
 
-pub use veni_eval::protocol::light::ways;
+pub use veni_light::sphere::ways;

@@ -40,9 +40,18 @@ impl WholeLoss {
                         losses.mage_scales
                     )));
                 }
-                let LossConfig { mage, scale_invariant, level, cosine, log_mse, hdr_mse, ldr_mse, .. } =
-                    losses;
-                let weights = [mage, scale_invariant, level, cosine, log_mse, hdr_mse, ldr_mse];
+                let LossConfig {
+                    mage,
+                    scale_invariant,
+                    level,
+                    cosine,
+                    log_mse,
+                    hdr_mse,
+                    ldr_mse,
+                    irradiance,
+                    ..
+                } = losses;
+                let weights = [mage, scale_invariant, level, cosine, log_mse, hdr_mse, ldr_mse, irradiance];
                 if weights.iter().all(|w| w.at(0) == 0.0) {
                     return Err(Error::invalid("the objective terms has no weight above 0 to begin with"));
                 }

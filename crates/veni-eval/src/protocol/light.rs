@@ -1,6 +1,6 @@
 //! `light`: does a decoded latent light things as the panorama does?
 //!
-//! *Irradiance*: E on surfaces facing 26 ways ([`ways`]), luminance, of the decoded panorama against the panorama's own. The
+//! *Irradiance*: E on surfaces facing 26 ways ([`ways`](veni_light::sphere::ways)), luminance, of the decoded panorama against the panorama's own. The
 //! error of a panorama is √⟨(ln E/E_true)²⟩ over the ways; aligned, ⟨ln E/E_true⟩ is taken out first, as one exposure would.
 //! *Sun*: [`Light`](veni_light::light::Light) looks for one in both, at the resolution of the evaluation: the angle between the two,
 //! |ln| of the ratio of their irradiances, and how many panoramas have one in one of the two only.
@@ -13,7 +13,7 @@ use crate::table::{Cell, Table};
 use veni_data::Item;
 use veni_data::parallel::parallel;
 use veni_light::light::{CompactLight, EnvironmentMap, LightOptions, luminance};
-use veni_light::sphere::Equirect;
+use veni_light::sphere::{Equirect, ways};
 
 /// Titles of the columns behind those that name a system.
 const COLUMNS: [&str; 9] = [
@@ -27,18 +27,6 @@ const COLUMNS: [&str; 9] = [
     "False suns",
     "Missed suns",
 ];
-
-/// The 26 ways from the middle of a cube of 3 × 3 × 3 to the others, of length 1.
-pub fn ways() -> Vec<[f32; 3]> {
-    (0..27)
-        .filter(|k| *k != 13)
-        .map(|k| {
-            let v = [k / 9, k / 3 % 3, k % 3].map(|c| c as f32 - 1.0);
-            let length = v.iter().map(|c| c * c).sum::<f32>().sqrt();
-            v.map(|c| c / length)
-        })
-        .collect()
-}
 
 /// How one panorama's light came out.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,6 +14,7 @@
 //! | [`Frame`] | directions of Blender, glTF, OpenEXR/USD, Bevy |
 //! | [`CubeFace`] | cube maps: texel directions and solid angles |
 //! | [`Stripes`], [`Gather`] | where the encoder looks, and fast lookup there |
+//! | [`ways`] | a few directions that stand for all |
 //! | [`mod@reference`] | the samplers of the reference implementation, for their weights and numbers |
 
 mod cube;
@@ -23,6 +24,7 @@ mod gather;
 pub mod reference;
 mod stripes;
 mod view;
+mod ways;
 
 pub use cube::CubeFace;
 pub use equirect::Equirect;
@@ -30,3 +32,4 @@ pub use frame::Frame;
 pub use gather::Gather;
 pub use stripes::{StripeSampling, Stripes};
 pub use view::View;
+pub use ways::ways;

@@ -92,6 +92,7 @@ impl TrainConfig {
             ("log_mse", &loss.log_mse),
             ("hdr_mse", &loss.hdr_mse),
             ("ldr_mse", &loss.ldr_mse),
+            ("irradiance", &loss.irradiance),
         ]
     }
 }

@@ -102,6 +102,9 @@ impl TrainConfig {
                 if !self.loss.mage.is_off() {
                     return foreign("loss.mage", "a set of rays, which an auto-decoder is trained on,");
                 }
+                if !self.loss.irradiance.is_off() {
+                    return foreign("loss.irradiance", "a set of rays, which an auto-decoder is trained on,");
+                }
                 if self.loss_grid != LossGrid::Full {
                     return foreign(
                         "loss_grid",

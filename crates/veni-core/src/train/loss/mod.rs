@@ -5,6 +5,7 @@
 //! the reference implementation number for number. Where they differ is said at each term.
 
 pub mod cosine;
+pub mod irradiance;
 pub mod kld;
 pub mod mage;
 pub mod mse;
@@ -73,6 +74,8 @@ pub struct Loss {
     config: LossConfig,
     rows: Tensor<4>,
     mage: Option<MageForm>,
+    /// Of the irradiance term, if it is on.
+    surfaces: Option<Tensor<2>>,
     /// Whether images are rays, which count alike.
     rays: bool,
 }
@@ -89,17 +92,19 @@ impl Loss {
         };
         let mage = (!config.mage.is_off())
             .then(|| MageForm::new(config.form, config.mage_scales, height, width, device));
-        Self { config: *config, rows, mage, rays: false }
+        let surfaces = (!config.irradiance.is_off()).then(|| irradiance::surfaces(height, width, device));
+        Self { config: *config, rows, mage, surfaces, rays: false }
     }
 
     /// For `rays` per panorama, as images `[B, rays, 1, 3]`. They are drawn evenly over the sphere and count alike.
     /// The reference form is RENI++'s: the scale-invariant error is taken over all rays of the batch jointly.
     ///
     /// # Panics
-    /// If MAGE is on: rays have no neighbours.
+    /// If MAGE or irradiance is on: rays have neither neighbours nor areas.
     pub fn rays(config: &LossConfig, rays: usize, device: &Device) -> Self {
-        assert!(config.mage.is_off(), "MAGE needs an image");
-        Self { config: *config, rows: Tensor::ones([1, rays, 1, 1], device), mage: None, rays: true }
+        assert!(config.mage.is_off() && config.irradiance.is_off(), "MAGE and irradiance need an image");
+        let rows = Tensor::ones([1, rays, 1, 1], device);
+        Self { config: *config, rows, mage: None, surfaces: None, rays: true }
     }
 
     /// All terms whose weight in `step` is not 0, those of the image first. Images `[B, H, W, 3]`; `posterior` is the
@@ -171,6 +176,11 @@ impl Loss {
         put("log_mse", &config.log_mse, &|| error(Space::Log));
         put("hdr_mse", &config.hdr_mse, &|| error(Space::Hdr));
         put("ldr_mse", &config.ldr_mse, &|| error(Space::Ldr));
+        if let Some(surfaces) = &self.surfaces {
+            put("irradiance", &config.irradiance, &|| {
+                irradiance::irradiance(prediction.clone(), target.clone(), surfaces.clone())
+            });
+        }
         LossTerms { terms }
     }
 }

@@ -42,6 +42,7 @@ fn all_on(form: LossForm) -> LossConfig {
         log_mse: one,
         hdr_mse: one,
         ldr_mse: one,
+        irradiance: one,
         ..LossConfig::default()
     }
 }
@@ -81,12 +82,32 @@ fn scale_invariant_and_level_add_up_to_the_log_error() {
 #[test]
 fn corrected_terms_turn_with_the_image() {
     let roll = |x: Tensor<4>| Tensor::cat(vec![x.clone().narrow(2, 6, W - 6), x.narrow(2, 0, 6)], 2);
-    let config = LossConfig { mage_scales: 1, ..all_on(LossForm::Corrected) };
+    // the surfaces of the irradiance term are 26, at multiples of 45°
+    let irradiance = WeightSchedule::Constant(0.0);
+    let config = LossConfig { mage_scales: 1, irradiance, ..all_on(LossForm::Corrected) };
     let still = terms(&config, image(0.4), image(0.0));
     let rolled = terms(&config, roll(image(0.4)), roll(image(0.0)));
     for ((name, a), (_, b)) in still.into_iter().zip(rolled) {
         assert!((a - b).abs() < 1e-5 * a.abs().max(1.0), "{name}: {a} {b}");
     }
+}
+
+#[test]
+fn the_irradiance_term_sees_factors_and_small_bright_things() {
+    let surfaces = irradiance::surfaces(H, W, &Device::flex());
+    let term = |p: Tensor<4>, i: Tensor<4>| number(irradiance::irradiance(p, i, surfaces.clone()));
+    // a factor on radiance is one on irradiance
+    assert!((term(image(0.0) + 0.7, image(0.0)) - 0.49).abs() < 1e-5);
+    // 1 everywhere: the irradiance is π
+    let one: Tensor<2> = surfaces.clone().sum_dim(1);
+    let sums = one.into_data().to_vec::<f32>().unwrap();
+    assert!(sums.iter().all(|e| (e / std::f32::consts::PI - 1.0).abs() < 0.05), "{sums:?}");
+    // one pixel e⁵ times as bright, which the mean log error hardly sees
+    let mut values = vec![0.0f32; H * W * 3];
+    values[3 * (H / 4 * W + W / 2)..][..3].fill(5.0);
+    let lit = Tensor::from_data(TensorData::new(values, [1, H, W, 3]), &Device::flex());
+    let dark = Tensor::zeros([1, H, W, 3], &Device::flex());
+    assert!(term(dark, lit) > 0.05);
 }
 
 #[test]
