@@ -206,7 +206,8 @@ fn irradiance(grid: Equirect, radiance: &[[f32; 3]]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    const GRID: Equirect = Equirect { width: 128, height: 64 };
+    /// Pixels of 0.7°: of a sun within one, the place is known to that.
+    const GRID: Equirect = Equirect { width: 512, height: 256 };
 
     /// Log radiance of a blue sky over grey ground, with a sun of this irradiance at an azimuth in degrees.
     fn sky(azimuth: f32, irradiance: f32) -> Vec<f32> {
