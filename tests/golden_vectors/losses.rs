@@ -47,6 +47,7 @@ fn weighted(case: &Case, device: &Device) {
         log_mse: weight("log_mse"),
         hdr_mse: weight("hdr_mse"),
         ldr_mse: weight("ldr_mse"),
+        irradiance: WeightSchedule::Constant(0.0),
     };
     let [_, height, width, _] = case.data("in.pred").shape[..] else {
         panic!("in.pred is not a batch of images")

@@ -19,11 +19,13 @@ mod environment;
 mod extract;
 mod lit;
 mod luminance;
+#[cfg(feature = "prefilter")]
 mod prefilter;
 mod quadrature;
 mod reduce;
 mod sampler;
 pub mod sh;
+#[cfg(feature = "prefilter")]
 mod spectrum;
 mod turn;
 mod vector;
@@ -33,10 +35,12 @@ pub use environment::EnvironmentMap;
 pub use extract::SunChoice;
 pub use lit::{Light, LightOptions};
 pub use luminance::{LUMINANCE, luminance};
+#[cfg(feature = "prefilter")]
 pub use prefilter::{CubeAxes, CubeMap, Dfg, Law, Levels, Prefilter, lobe_gains};
 pub use quadrature::gauss_legendre;
 pub use sampler::{Sample, Sampler, SplitSampler};
 pub use sh::Sh;
+#[cfg(feature = "prefilter")]
 pub use spectrum::{MAX_DEGREE, Spectrum};
 
 #[cfg(test)]

@@ -81,7 +81,7 @@ impl TrainConfig {
     }
 
     /// The weights of the losses by their names.
-    fn loss_weights(&self) -> [(&'static str, &WeightSchedule); 8] {
+    fn loss_weights(&self) -> [(&'static str, &WeightSchedule); 9] {
         let loss = &self.loss;
         [
             ("mage", &loss.mage),
