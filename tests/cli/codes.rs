@@ -36,6 +36,11 @@ fn the_sun_of_a_panorama_is_in_its_code_and_its_energy_in_every_picture() {
         let expected = measured["sun"]["irradiance"][k].as_f64().unwrap();
         assert!((irradiance / expected - 1.0).abs() < 1e-4, "{irradiance} {expected}");
     }
+    let [facts] = &dir.json(&["inspect", "sky.json"])[..] else { panic!("one object") };
+    let radius = facts["sun"]["radius"].as_f64().unwrap();
+    assert!((radius - f64::from(sun.radius.to_degrees())).abs() < 1e-4, "{facts}");
+    let said = dir.ok(&["inspect", "sky.json"]);
+    assert!(said.contains("(D = 34)") && said.contains("elevation") && said.contains("E⊥"), "{said}");
     let raw = std::fs::read_to_string(dir.path("sky.json")).unwrap();
     assert!(raw.contains("\"format\":2") && raw.contains("\"sun\":{"), "{raw}");
     // without its lights the same code is one of format 1

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use anyhow::Result;
-use serde_json::json;
+use serde_json::{Value, json};
 use veni_light::latent::Latent;
+use veni_light::light::CompactLight;
 
 use super::facts::Facts;
 
@@ -12,12 +13,20 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     let latent = Latent::load(path)?;
     let mut facts = Facts::new("latent");
     let n = latent.vectors.len();
-    facts.add("vectors", format!("{n} (D = {})", 3 * n), n);
+    facts.add("vectors", format!("{n} (D = {})", latent.dimension()), n);
     let lengths: Vec<f32> =
         latent.vectors.iter().map(|v| v.iter().map(|c| c * c).sum::<f32>().sqrt()).collect();
     let shown: Vec<_> = lengths.iter().take(12).map(|l| format!("{l:.2}")).collect();
     let more = if n > 12 { format!(" … ({} more)", n - 12) } else { String::new() };
     facts.add("lengths", shown.join(" ") + &more, json!(lengths));
+    for (at, light) in latent.lights.iter().enumerate() {
+        let name =
+            if at == 0 && latent.lights.sun().is_some() { "sun" } else { LAMPS[at.min(LAMPS.len() - 1)] };
+        facts.add(name, text(light, latent.log_exposure), described(light, latent.log_exposure));
+    }
+    if !latent.lobes.is_empty() {
+        facts.add("lobes", latent.lobes.len().to_string(), latent.lobes.len());
+    }
     let stops = latent.log_exposure / std::f32::consts::LN_2;
     facts.add(
         "exposure",
@@ -29,9 +38,53 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     Ok(facts)
 }
 
+/// What lights that are not the sun are called, by their place; those beyond share the last.
+const LAMPS: [&str; 10] = [
+    "light 1",
+    "light 2",
+    "light 3",
+    "light 4",
+    "light 5",
+    "light 6",
+    "light 7",
+    "light 8",
+    "light 9",
+    "more lights",
+];
+
+/// A light in units of radiance: exposure included.
+fn text(light: &CompactLight, log_exposure: f32) -> String {
+    let [r, g, b] = light.irradiance.map(|e| e * log_exposure.exp());
+    format!(
+        "elevation {:.2}°, azimuth {:.2}°, radius {:.2}° ({}), E⊥ {r:.4} {g:.4} {b:.4}{}",
+        light.elevation().to_degrees(),
+        light.azimuth().to_degrees(),
+        light.radius.to_degrees(),
+        light.radius_source,
+        if light.clipped { " or more" } else { "" }
+    )
+}
+
+fn described(light: &CompactLight, log_exposure: f32) -> Value {
+    json!({
+        "direction": light.direction,
+        "azimuth": light.azimuth().to_degrees(),
+        "elevation": light.elevation().to_degrees(),
+        "irradiance": light.irradiance.map(|e| e * log_exposure.exp()),
+        "radius": light.radius.to_degrees(),
+        "radius_source": light.radius_source.to_string(),
+        "clipped": light.clipped,
+    })
+}
+
 /// One line for a latent that is part of something else.
 pub(super) fn summary(latent: &Latent) -> String {
     let of = latent.model.as_ref().map(|m| format!(" of model {m}")).unwrap_or_default();
     let from = latent.source.as_ref().map(|s| format!(", from {s}")).unwrap_or_default();
-    format!("{} vectors{of}{from}", latent.vectors.len())
+    let lights = match latent.lights.len() {
+        0 => String::new(),
+        1 => " and a light".to_owned(),
+        m => format!(" and {m} lights"),
+    };
+    format!("{} vectors{lights}{of}{from}", latent.vectors.len())
 }

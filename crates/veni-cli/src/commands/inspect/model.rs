@@ -19,6 +19,10 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     facts.add("hash", model.hash(), model.hash());
     let n = model.latent_vectors();
     facts.add("latent vectors", format!("{n} (D = {})", 3 * n), n);
+    if config.lights > 0 {
+        let lights = config.lights;
+        facts.add("lights", format!("trained on panoramas without up to {lights}"), lights);
+    }
     let d = &config.decoder;
     facts.add(
         "decoder",
