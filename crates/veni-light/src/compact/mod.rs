@@ -1,4 +1,4 @@
-//! Compact lights: what reaches a scene from a few small solid angles, each told by seven numbers. LIGHT (1) to (9).
+//! Compact lights: what reaches a scene from a few small solid angles, seven numbers each. LIGHT (1) to (9), MODEL (72).
 
 mod cube;
 mod disc;

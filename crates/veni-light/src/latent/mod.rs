@@ -1,4 +1,4 @@
-//! The latent code: N vectors in R³ that turn with the scene, its compact lights, and an exposure. MODEL (2), (71).
+//! The latent code: N vectors in R³ that turn with the scene, its compact lights, and an exposure. MODEL (2), MODEL (71).
 //!
 //! Turning a panorama by α about z turns every vector, light and lobe by α about z; the x and y of a vector form its equivariant
 //! part, z its invariant part. The paper's code is the vectors alone, of dimension D = 3N; a light and a lobe take seven numbers
