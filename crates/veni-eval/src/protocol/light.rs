@@ -1,6 +1,6 @@
 //! `light`: does a decoded latent light things as the panorama does?
 //!
-//! *Irradiance*: E on surfaces facing 26 ways ([`ways`](veni_light::sphere::ways)), luminance, of the decoded panorama against the panorama's own. The
+//! *Irradiance*: E on surfaces facing 26 ways ([`ways`]), luminance, of the decoded panorama against the panorama's own. The
 //! error of a panorama is √⟨(ln E/E_true)²⟩ over the ways; aligned, ⟨ln E/E_true⟩ is taken out first, as one exposure would.
 //! *Sun*: [`Light`](veni_light::light::Light) looks for one in both, at the resolution of the evaluation: the angle between the two,
 //! |ln| of the ratio of their irradiances, and how many panoramas have one in one of the two only.
