@@ -45,7 +45,8 @@ impl GpuDecoder {
     /// Folds a latent on the CPU (microseconds) and uploads it: a few kilobytes.
     ///
     /// # Errors
-    /// [`Error::Core`] if the latent does not fit the model or is not finite; [`Error::Gpu`] if there is no memory.
+    /// [`Error::Core`] if the latent does not fit the model, is not finite, or has lights or lobes, which the shaders do not draw;
+    /// [`Error::Gpu`] if there is no memory.
     pub fn condition(&self, queue: &Queue, latent: &Latent) -> Result<GpuLatents> {
         self.condition_batch(queue, std::slice::from_ref(latent))
     }
@@ -106,14 +107,7 @@ impl GpuDecoder {
     fn fold(&self, latents: &[Latent]) -> Result<Vec<f32>> {
         let mut data = Vec::with_capacity(4 * self.sizes.latent_stride() * latents.len());
         for latent in latents {
-            if !(latent.lights.is_empty() && latent.lobes.is_empty()) {
-                return Err(Error::unsupported(
-                    "the shaders decode the vectors of a code, not its lights and lobes: draw its lights as your own \
-                     (Field::lights), and take them out of the latent first"
-                        .to_owned(),
-                ));
-            }
-            pack_latent(self.sizes, &self.decoder.condition(latent)?, &mut data);
+            pack_latent(self.sizes, &self.decoder.condition(latent)?, &mut data)?;
         }
         Ok(data)
     }

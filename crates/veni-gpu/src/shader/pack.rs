@@ -2,6 +2,7 @@
 
 use veni_light::field::Field;
 use veni_light::model::Model;
+use veni_light::{Error, Result};
 
 use super::Sizes;
 
@@ -72,10 +73,20 @@ pub fn pack_model(model: &Model) -> PackedModel {
 /// Appends the block of a conditioned latent to `veni_latents`: [`Sizes::latent_stride`] vec4s. `sizes` are those of the
 /// model that conditioned it.
 ///
+/// # Errors
+/// [`Error::Unsupported`] if the code has lights or lobes: the shaders decode its vectors. A host that draws the lights itself packs
+/// [`Field::without_lights`].
+///
 /// # Panics
 /// If that model's hidden size is too small for `sizes`.
-pub fn pack_latent(sizes: Sizes, field: &Field, out: &mut Vec<f32>) {
+pub fn pack_latent(sizes: Sizes, field: &Field, out: &mut Vec<f32>) -> Result<()> {
     let folded = field.folded();
+    if !(field.lights().is_empty() && folded.lobes.is_empty()) {
+        return Err(Error::unsupported(
+            "the shaders decode the vectors of a code, not its lights and lobes: draw its lights as your own (Field::lights), and \
+             condition a latent without them",
+        ));
+    }
     let mut rows = Rows { row: 4 * sizes.columns(), data: std::mem::take(out) };
     rows.push(&folded.input_bias[..sizes.hidden]);
     folded.shifts.iter().for_each(|shift| rows.push(&shift[..sizes.hidden]));
@@ -89,6 +100,7 @@ pub fn pack_latent(sizes: Sizes, field: &Field, out: &mut Vec<f32>) {
     data.push(folded.log_exposure);
     data.extend(counts);
     *out = data;
+    Ok(())
 }
 
 /// `v` as a number of 12 significant bits and the rest: products of the first with its like are exact.
@@ -133,7 +145,7 @@ mod tests {
             assert_eq!(packed.vectors.len(), 4 * sizes.columns() * sizes.vector_rows());
             let latent = Latent::from_seed(&Prior::standard(n), 3);
             let mut block = vec![7.0];
-            pack_latent(sizes, &model.decoder().unwrap().condition(&latent).unwrap(), &mut block);
+            pack_latent(sizes, &model.decoder().unwrap().condition(&latent).unwrap(), &mut block).unwrap();
             assert_eq!(block.len(), 1 + 4 * sizes.latent_stride());
         }
     }

@@ -4,7 +4,8 @@ use veni_gpu::read_back::{self, Picture, bake_rows};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::{BufferUsages, TextureFormat, TextureUsages};
 use veni_gpu::{Bake, Error, GpuDecoder};
-use veni_light::latent::Latent;
+use veni_light::latent::{Latent, Lobe};
+use veni_light::light::{CompactLight, Lights};
 use veni_light::sphere::{Equirect, Frame};
 
 use crate::util::{self, agrees, difference, filler, latent};
@@ -52,6 +53,12 @@ fn what_does_not_fit_is_named() {
     let mut poisoned = latent(4, 1);
     poisoned.vectors[2][1] = f32::NAN;
     assert!(message(&poisoned).contains("vector 2"));
+    // what the shaders do not draw is not left out without a word
+    let sun = CompactLight::new([0.0, 0.0, 1.0], [1.0; 3], CompactLight::SUN_RADIUS);
+    let lit = Latent { lights: Lights::new(Some(sun), []), ..latent(4, 1) };
+    assert!(message(&lit).contains("lights"));
+    let lobe = Lobe { direction: [0.0, 0.0, 1.0], amplitude: [1.0; 3], sharpness: 4.0 };
+    assert!(message(&Latent { lobes: vec![lobe], ..latent(4, 1) }).contains("lobes"));
     assert!(decoder.condition_batch(queue, &[]).unwrap_err().to_string().contains("0 latents"));
     let two = [latent(4, 1), latent(4, 2)];
     assert!(decoder.update(queue, &latents, 0, &two).unwrap_err().to_string().contains("do not fit"));

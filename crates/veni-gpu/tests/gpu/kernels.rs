@@ -25,7 +25,8 @@ impl Work {
         let packed = pack_model(model);
         let mut blocks = Vec::new();
         for latent in latents {
-            pack_latent(packed.sizes, &model.decoder().unwrap().condition(latent).unwrap(), &mut blocks);
+            pack_latent(packed.sizes, &model.decoder().unwrap().condition(latent).unwrap(), &mut blocks)
+                .unwrap();
         }
         let count = directions.len() as u32;
         let request = Request {
