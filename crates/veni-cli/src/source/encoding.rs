@@ -53,7 +53,11 @@ impl<'a> Encoding<'a> {
     pub(crate) fn encode_file(&self, path: &Path, layer: &Layer, report: Report) -> Result<Encoded> {
         let panorama = panorama(path, layer, report)?;
         let grid = Equirect::new(GRID[0], GRID[1]);
-        let item = Item::split(path, panorama.clone(), grid, self.lights).map_err(|e| e.in_file(path))?;
+        let whole = Item::new(path, &panorama, grid);
+        let item = match self.lights {
+            0 => whole.clone(),
+            most => Item::split(path, panorama.clone(), grid, most).map_err(|e| e.in_file(path))?,
+        };
         let encoded =
             self.encoder.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
         let vectors = encoded.into_iter().next().map(|e| e.vectors).unwrap_or_default();
@@ -68,7 +72,6 @@ impl<'a> Encoding<'a> {
         let decoder = self.loaded.model.decoder().map_err(|e| e.in_file(&self.loaded.name))?;
         let field = decoder.condition(&latent).map_err(|e| e.in_file(path))?;
         // the paper's protocol, as in training, on the panorama as a whole
-        let whole = Item::new(path, &panorama, grid);
         let decoded = Panorama::new(grid, field.bake(grid)).log();
         let prediction: Vec<f32> = decoded.as_flattened().iter().map(|v| v - whole.log_exposure).collect();
         let scores = scores(&prediction, &whole.log_radiance, grid.height, grid.width, Alignment::LogFactor);

@@ -86,13 +86,17 @@ impl Glow {
     pub(super) fn add_to_rows(&self, grid: Equirect, rows: Range<usize>, pixels: &mut [[f32; 3]]) {
         let height = std::f64::consts::PI / grid.height as f64;
         let n = self.places(height);
+        let polar = self.direction[2].clamp(-1.0, 1.0).acos();
+        // the angle to the row is the least to its directions
+        let near = |row: usize| (grid.polar(row) - polar).abs() <= REACH * self.deviation() + height;
+        if !rows.clone().any(near) {
+            return;
+        }
         let turn = |fraction: f64| std::f64::consts::PI * (1.0 - 2.0 * fraction / grid.width as f64);
         let columns: Vec<(f64, f64)> =
             (0..grid.width * n).map(|k| turn((k as f64 + 0.5) / n as f64).sin_cos()).collect();
-        let polar = self.direction[2].clamp(-1.0, 1.0).acos();
         for (row, pixels) in rows.zip(pixels.chunks_exact_mut(grid.width)) {
-            // the angle to the row is the least to its directions
-            if (grid.polar(row) - polar).abs() > REACH * self.deviation() + height {
+            if !near(row) {
                 continue;
             }
             let places: Vec<(f64, f64)> =
