@@ -71,6 +71,9 @@ fn the_sun_of_a_panorama_is_in_its_code_and_its_energy_in_every_picture() {
     };
     let (lit, rest) = (cube("sky.json", "c.exr"), cube("plain.json", "cp.exr"));
     assert!(close([0, 1, 2].map(|c| lit[c] - rest[c]), own, 1e-3), "{lit:?} {rest:?} {own:?}");
+    // a sun that half precision does not hold is known before it is met
+    let run = dir.run(&["bake", "sky.json", "-o", "half.exr", "--size", "256", "--exposure", "5"]);
+    assert!(run.code == Some(0) && run.err.matches("beyond half precision").count() == 1, "{}", run.err);
     // a baked file gives back the code, lights included, and turns with it
     dir.ok(&["bake", "512x256.exr", "--turn", "90", "-o", "turned.exr"]);
     let [turned] = &dir.json(&["light", "turned.exr"])[..] else { panic!("one object") };

@@ -65,6 +65,10 @@ impl Picture {
         self.grid
     }
 
+    pub(crate) fn is_panorama(&self) -> bool {
+        self.layout == Layout::Equirect
+    }
+
     pub(crate) fn frame_name(&self) -> String {
         self.frame.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default()
     }

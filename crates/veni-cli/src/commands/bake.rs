@@ -158,6 +158,12 @@ impl Bake {
             (_, true) => (Precision::Float, false),
             _ => (Precision::Half, true),
         };
+        // known beforehand of lights, and not found out at their row
+        let peak = latent.lights.scaled(latent.log_exposure.exp()).peak(picture.grid());
+        if may_change && peak > HALF_RANGE[1] && has_exr(&files(precision)?) && picture.is_panorama() {
+            report.note(beyond(peak));
+            precision = Precision::Float;
+        }
         let bars = Bars::new(report);
         loop {
             let (files, mut range) = (files(precision)?, Range::default());
@@ -179,7 +185,7 @@ impl Bake {
                 (Err(_), Some(value)) if watch && value >= f32::MIN_POSITIVE => {
                     let [least, most] = HALF_RANGE;
                     report.note(if value > most {
-                        format!("radiance of {value:.0} is beyond half precision ({most}): writing floats")
+                        beyond(value)
                     } else {
                         format!("half precision loses bits of a radiance of {value:.1e} (below {least:.1e}): writing floats")
                     });
@@ -235,6 +241,10 @@ impl Bake {
         });
         report.result(human, &value)
     }
+}
+
+fn beyond(value: f32) -> String {
+    format!("radiance of {value:.0} is beyond half precision ({}): writing floats", HALF_RANGE[1])
 }
 
 /// The smallest and the largest value of what is baked.

@@ -58,6 +58,11 @@ impl Glow {
         }
     }
 
+    /// Radiance in the middle, of the brightest channel.
+    pub(super) fn most(&self) -> f32 {
+        self.irradiance.iter().fold(0.0, |most: f32, e| most.max((self.peak * f64::from(*e)) as f32))
+    }
+
     /// The standard deviation along each of two axes, radians.
     fn deviation(&self) -> f64 {
         1.0 / self.kappa.sqrt()

@@ -2,7 +2,7 @@
 
 use std::ops::{Deref, Range};
 
-use super::{CompactLight, Glow, RadiusSource};
+use super::{CompactLight, Disc, Glow, RadiusSource};
 use crate::limits::MAX_LIGHTS;
 use crate::sphere::{Equirect, Frame};
 use crate::{Error, Result};
@@ -79,6 +79,20 @@ impl Lights {
                 None => light.add_to_rows(grid, rows.clone(), pixels),
             }
         }
+    }
+
+    /// The largest value that one of the lights adds to a pixel of a panorama.
+    pub fn peak(&self, grid: Equirect) -> f32 {
+        let of_light = |light: &CompactLight| {
+            if let Some(glow) = Glow::new(light) {
+                return glow.most();
+            }
+            let most = light.irradiance.into_iter().fold(0.0, f32::max);
+            let parts = Disc::new(light.direction, light.radius).parts(grid).into_iter();
+            let density = parts.map(|(index, part)| part / grid.solid_angle(index / grid.width));
+            (density.fold(0.0, f64::max) * f64::from(most)) as f32
+        };
+        self.all.iter().map(of_light).fold(0.0, f32::max)
     }
 
     /// What each texel of a cube map whose faces are named by `frame` ([`CubeFace::direction`](crate::sphere::CubeFace::direction)) gains from the lights: indices,
