@@ -157,8 +157,11 @@ impl LoadedModel {
         Ok(whole.map(|(rest, vectors)| Latent { vectors, ..rest.code.clone() }).collect())
     }
 
-    /// The vectors of the encoder's posteriors' means for images without lights.
-    fn encode_rest(&self, grid: Equirect, images: &[&[f32]]) -> Result<Vec<Vec<[f32; 3]>>> {
+    /// The vectors of the encoder's posteriors' means for images whose lights are out ([`LoadedModel::without_lights`]).
+    ///
+    /// # Errors
+    /// As [`LoadedModel::encode`].
+    pub fn encode_rest(&self, grid: Equirect, images: &[&[f32]]) -> Result<Vec<Vec<[f32; 3]>>> {
         let veni =
             self.veni().ok_or_else(|| Error::invalid(format!("{}: this model has no encoder", self.name)))?;
         Ok(veni.encode(grid, images)?.into_iter().map(|e| e.vectors).collect())

@@ -163,7 +163,8 @@ impl Dataset {
 /// Most files that one error names.
 const MOST_NAMED: usize = 20;
 
-/// Reads files, in parallel, without up to `lights` compact lights of each; all that cannot be read are named together. Each panorama goes through `keep` with its place in the list, and advances the
+/// Reads files, in parallel, without up to `lights` compact lights of each; all that cannot be read are named together. Each
+/// panorama goes through `keep` with its place in the list, and advances the
 /// observer by one.
 pub(super) fn load(
     files: &[PathBuf],

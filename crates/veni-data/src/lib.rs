@@ -8,6 +8,7 @@ pub mod coarsen;
 mod dataset;
 pub mod expand;
 mod fold;
+mod generated;
 pub mod limits;
 mod listing;
 pub mod parallel;

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::dataset::{Dataset, Item, load};
+use super::dataset::{Dataset, load};
 use super::fold::Fold;
+use super::generated::generated;
 use super::listing::panorama_files;
 use super::prepare::capture;
 use super::store::PixelStore;
@@ -16,7 +16,6 @@ use veni_image::ReadOptions;
 use veni_light::progress::{Observer, Silent};
 use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
-use veni_synth::{Overrides, Scene, render};
 
 /// Where panoramas come from and at which resolution they are used.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -194,31 +193,6 @@ fn captures_in_order(files: Vec<PathBuf>, seed: u64) -> Vec<Vec<PathBuf>> {
     order.into_iter().map(|at| std::mem::take(&mut groups[at])).collect()
 }
 
-/// The grid on which generated scenes are rendered if their lights are to be taken out.
-const SUN_GRID: Equirect = Equirect { width: 512, height: 256 };
-
-/// Scenes 0..`count` of the set with this seed, in order; each goes through `keep` with its number.
-fn generated(
-    count: usize,
-    seed: u64,
-    (grid, lights): (Equirect, usize),
-    keep: impl Fn(usize, Item) -> Result<Item> + Sync,
-    observer: &dyn Observer,
-) -> Result<Vec<Item>> {
-    let make = |index: usize| {
-        // lights are found where a sun is a few pixels
-        let full = if lights > 0 { SUN_GRID } else { grid };
-        let panorama = render(&Scene::draw(seed, index as u64, &Overrides::default()), full);
-        let path = format!("synth-{index:06}");
-        let item = Item::split(Path::new(&path), panorama, grid, lights)?;
-        let item = Item { generated: true, ..item };
-        let item = keep(index, item)?;
-        observer.advance(1);
-        Ok(item)
-    };
-    (0..count).into_par_iter().map(make).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -250,7 +224,7 @@ mod tests {
     }
 
     fn names(set: &Dataset) -> Vec<String> {
-        set.items().iter().map(Item::name).collect()
+        set.items().iter().map(crate::Item::name).collect()
     }
 
     #[test]

@@ -12,14 +12,13 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Result, bail};
-use clap::{Args, value_parser};
+use clap::Args;
 use serde_json::json;
 use veni_fit::{Best, FitConfig, Observation, best_light, random_starts};
 use veni_image::Picture;
-use veni_image::metrics::{Alignment, Scores, scores};
+use veni_image::metrics::Scores;
 use veni_light::latent::Latent;
 use veni_light::output::Overwrite;
-use veni_light::sphere::Equirect;
 
 use crate::args::{Force, ModelArgs};
 use crate::latent_files::{LatentFiles, source_of};
@@ -34,7 +33,7 @@ use crate::source;
 
 pub(crate) use input::Input;
 use integrals::Integrals;
-use lit::Lit;
+use lit::{Lit, LitArgs};
 use model::FitModel;
 use settings::{Settings, Start};
 use shaded::Shaded;
@@ -83,10 +82,8 @@ pub(crate) struct Fit {
     #[arg(long, value_name = "OUT")]
     uncertainty: Option<PathBuf>,
 
-    /// Take up to N compact lights (the sun, lamps) out of a whole panorama of high dynamic range before the fit, and put them into
-    /// the latent [default: as many as the model was trained without]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8), conflicts_with_all = ["fov", "mask", "normals"])]
-    compact_lights: Option<u8>,
+    #[command(flatten)]
+    lit: LitArgs,
 
     /// Size of the images of --completed and --uncertainty [default: that of a panorama, 1024x512 for a photograph]
     #[arg(long, value_name = "W|WxH")]
@@ -183,17 +180,15 @@ impl Fit {
             Some(normals) => self.fit_light(path, normals, &picture, model, config, report)?,
             None => {
                 let grid = self.settings.grid(picture.is_partial())?;
-                let lit = Lit::new(&picture, self.most_lights(&picture, model, report))
-                    .map_err(|e| e.in_file(path))?;
+                let most = self.lit.most(model.lights(), &picture, self.input.view().is_some(), report);
+                let lit = Lit::new(&picture, most).map_err(|e| e.in_file(path))?;
                 let rest = lit.rest.as_ref().unwrap_or(&picture);
                 let observation = self.input.observe(rest, grid).map_err(|e| e.in_file(path))?;
                 let mut fitted = self.fit(path, observation, model, config, report)?;
-                for latent in fitted.best.all.iter_mut().chain([&mut fitted.best.latent]) {
-                    latent.lights = lit.lights.scaled((-latent.log_exposure).exp());
-                }
+                lit.put_into(&mut fitted.best);
                 if !lit.lights.is_empty() && fitted.scores.is_some() {
                     let whole = self.input.observe(&picture, grid).map_err(|e| e.in_file(path))?;
-                    fitted.scores = Some(score(model, &fitted.best.latent, &whole)?);
+                    fitted.scores = Some(model.score(&fitted.best.latent, &whole)?);
                 }
                 fitted
             }
@@ -202,23 +197,6 @@ impl Fit {
         let seen = Some(&picture).filter(|_| self.shaded.normals.is_none());
         self.keep(&mut fitted.best, path, output, seen, model)?;
         self.print(path, output, &fitted, report)
-    }
-
-    /// So many lights are looked for in a picture: none in part of one, nor where values are cut off.
-    fn most_lights(&self, picture: &Picture, model: &FitModel, report: Report) -> usize {
-        let [width, height] = picture.size();
-        let whole = width == 2 * height
-            && !picture.is_partial()
-            && picture.clip().is_none()
-            && picture.not_finite() == 0
-            && self.input.view().is_none();
-        let most = self.compact_lights.map_or(model.lights(), usize::from);
-        if most > 0 && !whole {
-            report.note(
-                "note: lights are measured in whole panoramas of high dynamic range; the latent of this picture has none",
-            );
-        }
-        if whole { most } else { 0 }
     }
 
     /// The light of which only integrals are known.
@@ -290,7 +268,7 @@ impl Fit {
         bars.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         let scores = match (partial, observation.clipped.is_some()) {
-            (false, false) => Some(score(model, &best.latent, &observation)?),
+            (false, false) => Some(model.score(&best.latent, &observation)?),
             _ => None,
         };
         // from the image's exposure 0 to its own
@@ -417,11 +395,4 @@ impl Fit {
             &(),
         )
     }
-}
-
-/// The paper's protocol, on the pixels that were fitted.
-fn score(model: &FitModel, latent: &Latent, seen: &Observation) -> Result<Scores> {
-    let Equirect { width, height } = seen.grid;
-    let decoded = model.decode(seen.grid, latent)?;
-    Ok(scores(&decoded, &seen.log_radiance, height, width, Alignment::LogFactor))
 }

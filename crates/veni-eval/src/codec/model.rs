@@ -104,7 +104,7 @@ impl Codec for Optimised<'_> {
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
         let rest = self.subject.without_lights(grid, image)?;
         let vectors = match self.start {
-            Start::Encoder => self.subject.encode(grid, &[image])?.remove(0).vectors,
+            Start::Encoder => self.subject.encode_rest(grid, &[&*rest.log_radiance])?.remove(0),
             Start::Zero => vec![[0.0; 3]; self.subject.latent_vectors()],
         };
         let fitted = self.settings.fit(self.subject, grid, &[&*rest.log_radiance], &[Latent::new(vectors)]);

@@ -5,7 +5,7 @@
 //! *Sun*: [`Light`](veni_light::light::Light) looks for one in both, at the resolution of the evaluation: the angle between the two,
 //! |ln| of the ratio of their irradiances, and how many panoramas have one in one of the two only.
 
-use super::quality::{coding, reconstruct};
+use super::quality::reconstruct;
 use super::{Evaluation, Report, Share, reconstruction};
 use crate::Result;
 use crate::codec::Codec;
@@ -78,8 +78,7 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 /// # Errors
 /// As coding and writing fail.
 pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    reconstruction::keep_models(run, share)?;
-    run.others.iter().try_for_each(|codec| coding(run, *codec).keep(run, share))
+    reconstruction::keep(run, share)
 }
 
 fn add(run: &Evaluation<'_>, codec: &dyn Codec, all: &mut Table, each: &mut Table) -> Result<()> {

@@ -1,9 +1,38 @@
 //! A panorama and its compact lights apart.
 
+use clap::{Args, value_parser};
+use veni_fit::Best;
 use veni_image::Picture;
 use veni_light::Result;
 use veni_light::light::{LightOptions, Lights};
 use veni_light::sphere::Equirect;
+
+use crate::report::Report;
+
+#[derive(Args, Debug)]
+pub(super) struct LitArgs {
+    /// Take up to N compact lights (the sun, lamps) out of a whole panorama of high dynamic range before the fit, and put them into
+    /// the latent [default: as many as the model was trained without]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8), conflicts_with_all = ["fov", "mask", "normals"])]
+    compact_lights: Option<u8>,
+}
+
+impl LitArgs {
+    /// So many lights are looked for in a picture, where a model was trained without `usual`: none in part of one (`view`: of a
+    /// photograph), nor where values are cut off.
+    pub(super) fn most(&self, usual: usize, picture: &Picture, view: bool, report: Report) -> usize {
+        let [width, height] = picture.size();
+        let seen = width == 2 * height && !picture.is_partial() && !view;
+        let whole = seen && picture.clip().is_none() && picture.not_finite() == 0;
+        let most = self.compact_lights.map_or(usual, usize::from);
+        if most > 0 && !whole {
+            report.note(
+                "note: lights are measured in whole panoramas of high dynamic range; the latent of this picture has none",
+            );
+        }
+        if whole { most } else { 0 }
+    }
+}
 
 /// What is left of a picture without its lights, and these.
 pub(super) struct Lit {
@@ -26,5 +55,12 @@ impl Lit {
         let light = options.of_pixels(Equirect::new(width, height), pixels)?;
         let lights = light.lights().clone();
         Ok(Self { rest: Some(Picture::new([width, height], light.into_residual())?), lights })
+    }
+
+    /// The lights into every latent that was fitted to the rest, at its exposure.
+    pub(super) fn put_into(&self, best: &mut Best) {
+        for latent in best.all.iter_mut().chain([&mut best.latent]) {
+            latent.lights = self.lights.scaled((-latent.log_exposure).exp());
+        }
     }
 }

@@ -5,7 +5,8 @@ use anyhow::Result;
 use veni_core::fit::best_of;
 #[cfg(not(feature = "learn"))]
 use veni_fit::best_of;
-use veni_fit::{Best, Encoder, FitConfig, FitTarget, LatentDecoder};
+use veni_fit::{Best, Encoder, FitConfig, FitTarget, LatentDecoder, Observation};
+use veni_image::metrics::{Alignment, Scores, scores};
 use veni_light::latent::{Latent, Prior};
 use veni_light::model::Model;
 use veni_light::sphere::Equirect;
@@ -89,6 +90,13 @@ impl FitModel {
         let mut radiance: Vec<_> = log.as_chunks::<3>().0.iter().map(|p| p.map(f32::exp)).collect();
         latent.lights.scaled(latent.log_exposure.exp()).add_to_rows(grid, 0..grid.height, &mut radiance);
         Ok(radiance.into_flattened().into_iter().map(f32::ln).collect())
+    }
+
+    /// The paper's protocol, on the pixels that were fitted.
+    pub(super) fn score(&self, latent: &Latent, seen: &Observation) -> Result<Scores> {
+        let Equirect { width, height } = seen.grid;
+        let decoded = self.decode(seen.grid, latent)?;
+        Ok(scores(&decoded, &seen.log_radiance, height, width, Alignment::LogFactor))
     }
 
     /// The best of the fits from every start.

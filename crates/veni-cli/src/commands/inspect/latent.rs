@@ -19,10 +19,15 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     let shown: Vec<_> = lengths.iter().take(12).map(|l| format!("{l:.2}")).collect();
     let more = if n > 12 { format!(" … ({} more)", n - 12) } else { String::new() };
     facts.add("lengths", shown.join(" ") + &more, json!(lengths));
-    for (at, light) in latent.lights.iter().enumerate() {
-        let name =
-            if at == 0 && latent.lights.sun().is_some() { "sun" } else { LAMPS[at.min(LAMPS.len() - 1)] };
-        facts.add(name, text(light, latent.log_exposure), described(light, latent.log_exposure));
+    let (sun, s) = (latent.lights.sun(), latent.log_exposure);
+    if let Some(sun) = sun {
+        facts.add("sun", text(sun, s), described(sun, s));
+    }
+    let others = latent.lights.others();
+    if !others.is_empty() {
+        let texts: Vec<_> = others.iter().map(|light| text(light, s)).collect();
+        let all: Vec<_> = others.iter().map(|light| described(light, s)).collect();
+        facts.add("lights", texts.join("; "), all);
     }
     if !latent.lobes.is_empty() {
         facts.add("lobes", latent.lobes.len().to_string(), latent.lobes.len());
@@ -37,20 +42,6 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     facts.add("source", latent.source.clone().unwrap_or_else(|| "unknown".into()), json!(latent.source));
     Ok(facts)
 }
-
-/// What lights that are not the sun are called, by their place; those beyond share the last.
-const LAMPS: [&str; 10] = [
-    "light 1",
-    "light 2",
-    "light 3",
-    "light 4",
-    "light 5",
-    "light 6",
-    "light 7",
-    "light 8",
-    "light 9",
-    "more lights",
-];
 
 /// A light in units of radiance: exposure included.
 fn text(light: &CompactLight, log_exposure: f32) -> String {
