@@ -2,6 +2,8 @@
 //!
 //! Most need the learning world. What does not also runs alone: `cargo test -p veni-cli --no-default-features --test cli`.
 
+#[cfg(feature = "pretrained")]
+mod asked;
 mod avif;
 #[cfg(feature = "learn")]
 mod bad_input;

@@ -48,6 +48,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     Bake(commands::bake::Bake),
     Sample(commands::sample::Sample),
+    Day(commands::day::Day),
     Synth(commands::synth::Synth),
     Encode(commands::encode::Encode),
     Fit(Box<commands::fit::Fit>),
@@ -71,6 +72,7 @@ impl Command {
         match self {
             Self::Bake(c) => c.run(report),
             Self::Sample(c) => c.run(report),
+            Self::Day(c) => c.run(report),
             Self::Synth(c) => c.run(report),
             Self::Encode(c) => c.run(report),
             Self::Fit(c) => c.run(report),

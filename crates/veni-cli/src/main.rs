@@ -8,7 +8,10 @@
 
 #[cfg(feature = "learn")]
 mod allocator;
+mod almanac;
 mod args;
+mod asked;
+mod baking;
 mod cli;
 mod commands;
 mod device;

@@ -63,6 +63,14 @@ pub(crate) fn albedo(text: &str) -> Result<[f32; 3], String> {
     }
 }
 
+/// A count from 1 to `MOST`.
+pub(crate) fn count_up_to<const MOST: usize>(text: &str) -> Result<usize, String> {
+    match text.trim().parse() {
+        Ok(count) if (1..=MOST).contains(&count) => Ok(count),
+        _ => Err(format!("give a number from 1 to {MOST}")),
+    }
+}
+
 /// Width of a panorama of lights.
 pub(crate) fn lights(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {

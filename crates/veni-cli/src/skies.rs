@@ -82,7 +82,7 @@ pub(crate) enum Format {
 }
 
 impl Format {
-    fn extension(self) -> &'static str {
+    pub(crate) fn extension(self) -> &'static str {
         match self {
             Self::Exr => "exr",
             Self::Hdr => "hdr",

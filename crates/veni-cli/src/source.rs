@@ -9,7 +9,7 @@ mod remembered;
 
 pub(crate) use encoding::{Encoded, Encoding};
 pub(crate) use image::{notes, panorama};
-pub(crate) use latent::{from_file, is_latent, model_of, seeded};
+pub(crate) use latent::{RandomSkies, from_file, is_latent, model_of};
 #[cfg(feature = "learn")]
 pub(crate) use model::model_file;
 pub(crate) use model::{Loaded, model};

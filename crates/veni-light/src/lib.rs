@@ -8,6 +8,7 @@
 //! | [`model`] | the weight file, and the models inside this crate |
 //! | [`field`] | the decoder folded for one latent: radiance in any direction |
 //! | [`light`] | what renderers need of an environment map |
+//! | [`skies`] | random skies on request: where the sun is, how overcast, how warm |
 //! | [`random`] | streams of random numbers that are the same on every machine |
 //! | [`cholesky`] | small dense systems of equations |
 //! | [`digest`] | content as one short name |
@@ -49,10 +50,13 @@ pub mod field;
 pub mod latent;
 pub mod light;
 pub mod limits;
+mod luminance;
 pub mod model;
 pub mod output;
 pub mod progress;
 pub mod random;
+#[cfg(feature = "gradients")]
+pub mod skies;
 pub mod sphere;
 mod tasks;
 pub mod text;

@@ -1,29 +1,23 @@
 //! `veni-cli bake`: latents to image files.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use anyhow::{Result, bail};
-use clap::{ArgGroup, Args, ValueEnum};
+use clap::{ArgGroup, Args};
 use serde_json::json;
-use veni_image::tonemap::{Curve, Tonemap};
-use veni_image::{HALF_RANGE, Precision, WriteFormat, WriteOptions};
 use veni_light::latent::Latent;
 use veni_light::output::Overwrite;
+use veni_light::skies::SkyMeasures;
 
 use crate::args::{Decoding, Force, Layer};
+use crate::asked::{self, Asked};
+use crate::baking::{Baked, Pictures};
 use crate::device::Device;
 use crate::features::{GPU, only};
-use crate::output::{self, with_remedy};
-use crate::picture::{FrameName, Layout, Picture, preview_tonemap};
-use crate::progress::Bars;
+use crate::picture::Picture;
 use crate::report::{self, Outcome, Report};
-use crate::size::Size;
 use crate::skies::{self, Change, Job, Many, Sky, Target};
-use crate::source::{self, Loaded};
-
-/// Stands where no PNG is written.
-const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
+use crate::source::{self, Loaded, RandomSkies};
 
 /// What a graphics card changes.
 const DEVICES: &str = "Devices: a graphics card bakes the same picture as the CPU to within rounding, and large ones \
@@ -50,6 +44,8 @@ const DEVICES: &str = "Devices: a graphics card bakes the same picture as the CP
         {}Examples:\n  \
         veni-cli bake --seed 7 -o sky.exr                      a random sky, 1024 x 512, half precision\n  \
         veni-cli bake --seed 7 -o sky.exr -o sky.png --size 4096\n  \
+        veni-cli bake --seed 7 -o noon.exr --sun 120,55 --overcast 0.2\n  \
+        veni-cli bake --seed 7 -o dusk.exr --date 2026-06-21T20:30+02:00 --place 48.1,11.6\n  \
         veni-cli bake sky.exr -o turned.exr --turn 90 --exposure -1\n  \
         {}veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512\n  \
         veni-cli bake latents/*.json --out-dir skies --format exr,png\n  \
@@ -70,29 +66,14 @@ pub(crate) struct Bake {
     #[command(flatten)]
     target: Target,
 
-    /// Width, or width x height; of one face for cube maps [default: 1024x512, faces of 256]
-    #[arg(long, value_name = "W|WxH")]
-    size: Option<Size>,
+    #[command(flatten)]
+    asked: Asked,
 
     #[command(flatten)]
     change: Change,
 
-    /// EXR in half precision; fails where radiance exceeds 65504, or is below 6.1e-5, where half precision loses bits
-    /// [default: half if it keeps all, else float]
-    #[arg(long, conflicts_with = "float")]
-    half: bool,
-
-    /// EXR in single precision
-    #[arg(long)]
-    float: bool,
-
-    /// Arrangement of directions
-    #[arg(long, value_enum, default_value_t)]
-    layout: Layout,
-
-    /// Axes that a cube map's faces are named by, and that the file says its directions have
-    #[arg(long, value_enum)]
-    frame: Option<FrameName>,
+    #[command(flatten)]
+    pictures: Pictures,
 
     #[command(flatten)]
     layer: Layer,
@@ -107,182 +88,82 @@ pub(crate) struct Bake {
     many: Many,
 }
 
+/// What all skies of a command are baked with.
+struct Baking {
+    picture: Picture,
+    skies: RandomSkies,
+    loaded: Loaded,
+    device: Device,
+}
+
 impl Bake {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
         let overwrite = Overwrite::from(self.force);
         let jobs = skies::jobs(&self.latents, self.seed, &self.target, &self.many, overwrite, report)?;
-        let picture = Picture::new(self.layout, self.frame, self.size)?;
+        if self.asked.is_any() && self.seed.is_none() {
+            bail!("wishes such as --sun and --overcast are for random skies: name one with --seed S");
+        }
+        let picture = self.pictures.picture()?;
         let files = jobs.iter().filter_map(|job| job.sky.file());
         let loaded = source::model_of(&self.decoding.model, files)?;
         loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
         let device = Device::open(self.decoding.device, &loaded.model, report)?;
-        report::each(jobs, |job| {
-            job.run(report, |job, report| self.one(job, &picture, &loaded, &device, report))
-        })
+        let baking = Baking {
+            picture,
+            skies: RandomSkies::new(&loaded, self.asked.request(report)?)?,
+            loaded,
+            device,
+        };
+        report::each(jobs, |job| job.run(report, |job, report| self.one(job, &baking, report)))
     }
 
     /// One sky to its files.
-    fn one(
-        &self,
-        job: &Job,
-        picture: &Picture,
-        loaded: &Loaded,
-        device: &Device,
-        report: Report,
-    ) -> Result<()> {
+    fn one(&self, job: &Job, baking: &Baking, report: Report) -> Result<()> {
+        let Baking { picture, skies, loaded, device } = baking;
         let overwrite = Overwrite::from(self.force);
         let named = match &job.sky {
             Sky::File(path) => source::from_file(path, &self.layer, loaded, report)?,
-            Sky::Seed(seed) => source::seeded(&loaded.model, *seed),
+            Sky::Seed(seed) => skies.sky(*seed)?,
         };
         let latent = self.change.of(&named);
-        let started = Instant::now();
-        let baker = device.condition(&latent)?;
-        let png = job.files.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")));
-        // the exposure of a preview is that of the sky before --exposure, which would otherwise be undone
-        let tonemap = if png { preview_tonemap(&device.condition(&named)?)? } else { NEUTRAL };
-        let attributes = picture.attributes(&latent, &loaded.model.hash())?;
-        let files = |precision| -> veni_light::Result<Vec<_>> {
-            let file = |path: &PathBuf| {
-                let mut format = WriteFormat::of(path, tonemap)?;
-                if let WriteFormat::Exr(p) = &mut format {
-                    *p = precision;
-                }
-                let attributes = attributes.clone();
-                Ok((path.clone(), WriteOptions { attributes, overwrite, ..WriteOptions::new(format) }))
-            };
-            job.files.iter().map(file).collect()
-        };
-        let (mut precision, may_change) = match (self.half, self.float) {
-            (true, _) => (Precision::Half, false),
-            (_, true) => (Precision::Float, false),
-            _ => (Precision::Half, true),
-        };
-        // known beforehand of lights, and not found out at their row
-        let peak = latent.lights.scaled(latent.log_exposure.exp()).peak(picture.grid());
-        if may_change && peak > HALF_RANGE[1] && has_exr(&files(precision)?) && picture.is_panorama() {
-            report.note(beyond(peak));
-            precision = Precision::Float;
-        }
-        let bars = Bars::new(report);
-        loop {
-            let (files, mut range) = (files(precision)?, Range::default());
-            let watch = may_change && precision == Precision::Half && has_exr(&files);
-            bars.begin("", "row", Some(picture.grid().height as u64));
-            let result = output::write_all(&files, picture.grid(), &mut |push| {
-                baker.rows(picture.directions(), &mut |row| {
-                    range.see(row)?;
-                    if watch && range.beyond_half().is_some() {
-                        return Err(veni_light::Error::invalid("beyond the range of half precision"));
-                    }
-                    bars.add(1);
-                    push(row)
-                })
-            });
-            bars.end();
-            match (result, range.beyond_half()) {
-                (Ok(()), _) => break,
-                (Err(_), Some(value)) if watch && value >= f32::MIN_POSITIVE => {
-                    let [least, most] = HALF_RANGE;
-                    report.note(if value > most {
-                        beyond(value)
-                    } else {
-                        format!("half precision loses bits of a radiance of {value:.1e} (below {least:.1e}): writing floats")
-                    });
-                    precision = Precision::Float;
-                }
-                (Err(error @ veni_light::Error::Invalid(_)), Some(value)) if self.half => {
-                    let change = if value > HALF_RANGE[1] {
-                        "darken with --exposure -1 …"
-                    } else {
-                        "brighten with --exposure 1 …"
-                    };
-                    bail!("{error} (leave --half out, or {change})")
-                }
-                (Err(error), _) => return Err(with_remedy(error)),
-            }
-        }
-        self.report(&job.files, picture, &latent, precision, device.name(), started, report)
+        let on = (device, &loaded.model);
+        let baked = self.pictures.write(&job.files, [&named, &latent], picture, on, overwrite, report)?;
+        let measures = self.asked.is_any().then(|| asked::measured(&latent, device)).transpose()?;
+        self.report(&baked, &latent, measures, baking, report)
     }
 
-    #[allow(clippy::too_many_arguments, reason = "all that is said of a file")]
     fn report(
         &self,
-        files: &[PathBuf],
-        picture: &Picture,
+        baked: &Baked,
         latent: &Latent,
-        precision: Precision,
-        device: &str,
-        started: Instant,
+        measured: Option<SkyMeasures>,
+        baking: &Baking,
         report: Report,
     ) -> Result<()> {
-        let seconds = started.elapsed().as_secs_f64();
-        // the other formats have but one
-        let exr = files.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")));
-        let precision = exr.then_some(if precision == Precision::Half { "half" } else { "float" });
+        let (picture, device) = (&baking.picture, baking.device.name());
+        let Baked { files, precision, seconds } = baked;
         let from = latent.source.as_deref().unwrap_or("unknown source");
-        let files: Vec<_> = files.iter().map(|p| p.display().to_string()).collect();
-        let human = format!(
-            "{}: {}, {from} ({seconds:.2} s on {device})",
-            files.join(", "),
-            picture.describe(precision)
-        );
+        let mut human = format!("{}: {}, {from}", files.join(", "), picture.describe(*precision));
+        if let Some(measures) = &measured {
+            human += &format!("; came: {}", asked::in_words(measures));
+        }
+        human += &format!(" ({seconds:.2} s on {device})");
         let grid = picture.grid();
-        let value = json!({
+        let mut value = json!({
             "files": files,
             "width": grid.width,
             "height": grid.height,
-            "layout": self.layout.to_possible_value().map(|v| v.get_name().to_owned()),
+            "layout": self.pictures.layout(),
             "frame": picture.frame_name(),
             "precision": precision,
             "device": device,
             "latent": serde_json::from_str::<serde_json::Value>(&latent.to_json()?)?,
             "seconds": seconds,
         });
+        if let Some(measures) = &measured {
+            value["asked"] = asked::request_json(baking.skies.request());
+            value["measured"] = asked::measures_json(measures);
+        }
         report.result(human, &value)
     }
-}
-
-fn beyond(value: f32) -> String {
-    format!("radiance of {value:.0} is beyond half precision ({}): writing floats", HALF_RANGE[1])
-}
-
-/// The smallest and the largest value of what is baked.
-#[derive(Clone, Copy, Debug)]
-struct Range {
-    low: f32,
-    high: f32,
-}
-
-impl Default for Range {
-    fn default() -> Self {
-        Self { low: f32::INFINITY, high: 0.0 }
-    }
-}
-
-impl Range {
-    /// Radiance is an exponential: where it is 0, or has lost bits already, it is too small for a number.
-    fn see(&mut self, row: &[[f32; 3]]) -> veni_light::Result<()> {
-        for value in row.as_flattened().iter().filter(|v| v.is_finite()) {
-            (self.low, self.high) = (self.low.min(*value), self.high.max(*value));
-        }
-        if self.low < f32::MIN_POSITIVE {
-            return Err(veni_light::Error::invalid(format!(
-                "a radiance of {:e} is below {:.1e}, the smallest number with all its bits: the exposure is too low",
-                self.low,
-                f32::MIN_POSITIVE
-            )));
-        }
-        Ok(())
-    }
-
-    /// The value that half precision does not keep, if there is one.
-    fn beyond_half(self) -> Option<f32> {
-        let [least, most] = HALF_RANGE;
-        [self.high].into_iter().find(|v| *v > most).or(Some(self.low).filter(|v| *v < least))
-    }
-}
-
-fn has_exr(files: &[(PathBuf, WriteOptions)]) -> bool {
-    files.iter().any(|(_, options)| matches!(options.format, WriteFormat::Exr(_)))
 }

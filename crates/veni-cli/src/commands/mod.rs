@@ -3,6 +3,7 @@
 pub(crate) mod bake;
 pub(crate) mod bench;
 pub(crate) mod completions;
+pub(crate) mod day;
 pub(crate) mod encode;
 #[cfg(feature = "learn")]
 pub(crate) mod evaluate;

@@ -14,13 +14,14 @@ use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
 
 use crate::args::{Decoding, Force};
+use crate::asked::Asked;
 use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::piped;
 use crate::progress::Bars;
 use crate::report::{Outcome, Report, to_stdout};
 use crate::size::Size;
-use crate::source::{self, Loaded};
+use crate::source::{self, Loaded, RandomSkies};
 
 /// More skies than anyone looks at.
 const MAX_CELLS: usize = 10_000;
@@ -36,6 +37,7 @@ const MAX_PIXELS: usize = 1 << 28;
     after_help = "Examples:\n  \
         veni-cli sample -o sheet.png                      seeds 0 to 15 in 4 x 4\n  \
         veni-cli sample -o sheet.png --seed 100 --grid 8x4 --size 128\n  \
+        veni-cli sample -o sheet.png --sun any --overcast 0.2      clear skies\n  \
         veni-cli sample -o sheet.png --latents skies      also skies/sky-0.json, skies/sky-1.json, …"
 )]
 pub(crate) struct Sample {
@@ -62,6 +64,9 @@ pub(crate) struct Sample {
     /// Also write each latent into this folder, as sky-SEED.json
     #[arg(long, value_name = "DIR")]
     latents: Option<PathBuf>,
+
+    #[command(flatten)]
+    asked: Asked,
 
     #[command(flatten)]
     decoding: Decoding,
@@ -126,15 +131,17 @@ impl Sample {
             bail!("--seed {}: leaves fewer than {count} seeds; give a smaller one", self.seed);
         };
         let files = self.latent_files(last, overwrite)?;
-        let Loaded { model, name } = source::model(&self.decoding.model)?;
-        model.config().decoder.check_folds().map_err(|e| e.in_file(&name))?;
-        let device = Device::open(self.decoding.device, &model, report)?;
+        let loaded = source::model(&self.decoding.model)?;
+        let Loaded { model, name } = &loaded;
+        model.config().decoder.check_folds().map_err(|e| e.in_file(name))?;
+        let skies = RandomSkies::new(&loaded, self.asked.request(report)?)?;
+        let device = Device::open(self.decoding.device, model, report)?;
         let cell = Equirect::new(width, height);
         let mut sheet = Sheet::new(grid.columns, grid.rows, width, height);
         let bars = Bars::new(report);
         bars.begin("", "sky", Some(count as u64));
         for (at, seed) in (self.seed..=last).enumerate() {
-            let latent = source::seeded(&model, seed);
+            let latent = skies.sky(seed)?;
             if let Some(file) = files.get(at) {
                 latent.save(file, overwrite).map_err(with_remedy)?;
             }

@@ -6,13 +6,17 @@ use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail};
 use veni_light::Error;
-use veni_light::latent::Latent;
+use veni_light::field::Decoder;
+use veni_light::latent::{Latent, Prior};
 use veni_light::model::Model;
+use veni_light::random::Stream;
+use veni_light::skies::SkyRequest;
 use veni_light::text::begins_object;
 
 use super::model::{Loaded, embedded, model};
 use super::remembered::is_of_its_pixels;
 use crate::args::{Layer, ModelArgs};
+use crate::asked::request_in_words;
 use crate::output::{CUBE_FACES, LATENT, with_remedy};
 use crate::report::Report;
 
@@ -28,9 +32,44 @@ pub(crate) fn model_of<'a>(args: &ModelArgs, files: impl IntoIterator<Item = &'a
     model(args)
 }
 
-/// The latent that `--seed` names: drawn from the model's prior.
-pub(crate) fn seeded(model: &Model, seed: u64) -> Latent {
-    Latent { model: Some(model.hash()), ..Latent::from_seed(&model.prior(), seed) }
+/// The latents that seeds name: drawn from the model's prior, as asked.
+pub(crate) struct RandomSkies {
+    prior: Prior,
+    request: SkyRequest,
+    /// Where something is asked.
+    decoder: Option<Decoder>,
+    model: String,
+}
+
+impl RandomSkies {
+    pub(crate) fn new(loaded: &Loaded, request: SkyRequest) -> Result<Self> {
+        let model = &loaded.model;
+        let decoder = if request.is_empty() { None } else { Some(model.decoder()?) };
+        Ok(Self { prior: model.prior(), request, decoder, model: model.hash() })
+    }
+
+    /// With nothing asked.
+    pub(crate) fn any(model: &Model) -> Self {
+        Self { prior: model.prior(), request: SkyRequest::default(), decoder: None, model: model.hash() }
+    }
+
+    /// What is asked of every sky.
+    pub(crate) fn request(&self) -> &SkyRequest {
+        &self.request
+    }
+
+    /// The sky of a seed.
+    pub(crate) fn sky(&self, seed: u64) -> Result<Latent> {
+        let latent = match &self.decoder {
+            None => Latent::from_seed(&self.prior, seed),
+            Some(decoder) => {
+                let latent = self.request.draw(decoder, &self.prior, &mut Stream::from_seed(seed))?;
+                let source = format!("seed {seed}, {}", request_in_words(&self.request));
+                Latent { source: Some(source), ..latent }
+            }
+        };
+        Ok(Latent { model: Some(self.model.clone()), ..latent })
+    }
 }
 
 /// The latent that a file names: its own, that of a baked image, or that of a panorama through the encoder. An image whose

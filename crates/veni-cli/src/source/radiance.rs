@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use veni_image::Panorama;
 use veni_light::sphere::Equirect;
 
-use super::{from_file, image, is_latent, model_of, seeded};
+use super::{RandomSkies, from_file, image, is_latent, model_of};
 use crate::args::{Decoding, Layer};
 use crate::device::Device;
 use crate::output::{CUBE_FACES, with_remedy};
@@ -61,7 +61,7 @@ pub(crate) fn radiance(
     loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
     let latent = match named {
         Named::File(path) => from_file(path, layer, &loaded, report)?,
-        Named::Seed(seed) => seeded(&loaded.model, seed),
+        Named::Seed(seed) => RandomSkies::any(&loaded.model).sky(seed)?,
     };
     let device = Device::open(decoding.device, &loaded.model, report)?;
     let panorama = Panorama::new(grid, device.condition(&latent)?.bake(grid)?);

@@ -1,7 +1,7 @@
 //! How likely a code is under a prior. MODEL (36).
 
 use super::Prior;
-use crate::cholesky::{self, Complex};
+use crate::cholesky;
 
 impl Prior {
     /// −ln p of the vectors up to a constant, |L⁻¹c|² + ½ |K⁻¹(z − μ)|² in the notation of [`Prior`], and its
@@ -11,13 +11,8 @@ impl Prior {
     /// If there are not N vectors.
     pub fn energy(&self, vectors: &[[f32; 3]]) -> (f64, Vec<[f64; 3]>) {
         let n = self.latent_vectors();
-        assert_eq!(vectors.len(), n, "a prior of {n} vectors");
-        let parts = self.xy_real.iter().zip(&self.xy_imaginary);
-        let xy: Vec<Complex> = parts.map(|(re, im)| [f64::from(*re), f64::from(*im)]).collect();
-        let z: Vec<f64> = self.z.iter().copied().map(f64::from).collect();
-        let mut c: Vec<[Complex; 1]> = vectors.iter().map(|v| [[f64::from(v[0]), f64::from(v[1])]]).collect();
-        let centred = vectors.iter().zip(&self.z_mean).map(|(v, m)| [f64::from(v[2]) - f64::from(*m)]);
-        let mut centred: Vec<[f64; 1]> = centred.collect();
+        let (mut c, mut centred) = self.centred(vectors);
+        let (xy, z) = self.factors();
         cholesky::forward(&xy, n, &mut c);
         cholesky::forward(&z, n, &mut centred);
         let energy = c.iter().map(|[[a, b]]| a * a + b * b).sum::<f64>()

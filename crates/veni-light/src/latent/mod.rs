@@ -5,13 +5,18 @@
 //! each.
 
 mod density;
+mod draw;
 mod file;
 mod lobe;
 mod prior;
+mod sun;
 
 pub use file::MAX_LATENT_BYTES;
 pub use lobe::Lobe;
 pub use prior::Prior;
+pub use sun::{SunPrior, SunRequest};
+pub(crate) use draw::{Draw, Row};
+pub(crate) use sun::{MEASURES, irradiance, schema as sun_schema, sine};
 
 use crate::compact::Lights;
 use crate::random::Stream;
@@ -47,7 +52,7 @@ impl Latent {
         3 * self.vectors.len() + 7 * (self.lights.len() + self.lobes.len())
     }
 
-    /// A random code: vectors and exposure drawn from `prior`. The same generator state gives the same bits
+    /// A random code: vectors, exposure and, where the prior knows of suns, a sun drawn from `prior`. The same generator state gives the same bits
     /// on every machine.
     pub fn sample(prior: &Prior, rng: &mut Stream) -> Self {
         prior.sample(rng)

@@ -6,11 +6,16 @@
 //! C = L Lᴴ, Σ = K Kᵀ, w circular complex normal (E|w|² = 1) and g standard normal.
 
 use super::Latent;
+use super::draw::Draw;
+#[cfg(feature = "gradients")]
+use super::draw::Row;
+use super::sun::{SunDraw, SunPrior};
 use crate::cholesky::{self, Complex, Scalar};
+use crate::compact::Lights;
 use crate::random::Stream;
 use crate::{Error, Result};
 
-/// A turn-invariant Gaussian of N latent vectors, and a normal log exposure.
+/// A turn-invariant Gaussian of N latent vectors, a normal log exposure, and what is known of the sun given the vectors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
     /// Row-major lower triangles, [N, N].
@@ -20,6 +25,7 @@ pub struct Prior {
     pub(crate) z_mean: Vec<f32>,
     /// Mean and standard deviation.
     pub(crate) log_exposure: [f32; 2],
+    pub(crate) sun: Option<SunPrior>,
 }
 
 impl Prior {
@@ -33,6 +39,7 @@ impl Prior {
             z: diagonal(1.0),
             z_mean: vec![0.0; n],
             log_exposure: [0.0; 2],
+            sun: None,
         }
     }
 
@@ -93,16 +100,39 @@ impl Prior {
             z: z.iter().map(|v| *v as f32).collect(),
             z_mean: z_mean.iter().map(|v| *v as f32).collect(),
             log_exposure: [exposure as f32, spread as f32],
+            sun: None,
         })
     }
 
-    /// Draws vectors and exposure; see [`Latent::sample`].
+    /// The same with the suns of `codes`, which are conditioned on their vectors ([`SunPrior::fit`]).
+    ///
+    /// # Panics
+    /// If a code does not have N vectors.
+    #[must_use]
+    pub fn with_suns_of(self, codes: &[Latent]) -> Self {
+        Self { sun: SunPrior::fit(codes, &self), ..self }
+    }
+
+    /// Draws a code; see [`Latent::sample`].
     pub(super) fn sample(&self, rng: &mut Stream) -> Latent {
+        self.code(&self.draw(rng))
+    }
+
+    /// The random numbers of a code.
+    pub(crate) fn draw(&self, rng: &mut Stream) -> Draw {
         let n = self.latent_vectors();
-        let w: Vec<[f64; 2]> =
-            (0..n).map(|_| rng.normals().map(|g| g * std::f64::consts::FRAC_1_SQRT_2)).collect();
-        let g: Vec<f64> = (0..n.div_ceil(2)).flat_map(|_| rng.normals()).collect();
+        let w = (0..n).map(|_| rng.normals().map(|g| g * std::f64::consts::FRAC_1_SQRT_2)).collect();
+        let g = (0..n.div_ceil(2)).flat_map(|_| rng.normals()).collect();
         let [exposure, _] = rng.normals();
+        // the last, so that vectors and exposure of a seed are those of a prior without suns
+        let sun = if self.sun.is_some() { SunDraw::new(rng) } else { SunDraw::default() };
+        Draw { w, g, exposure, sun }
+    }
+
+    /// The code of a draw.
+    pub(crate) fn code(&self, draw: &Draw) -> Latent {
+        let Draw { w, g, exposure, .. } = draw;
+        let n = self.latent_vectors();
         let vector = |i: usize| {
             let mut v = [0.0, 0.0, f64::from(self.z_mean[i])];
             for j in 0..=i {
@@ -117,9 +147,56 @@ impl Prior {
         let [mean, deviation] = self.log_exposure.map(f64::from);
         Latent {
             vectors: (0..n).map(vector).collect(),
+            lights: Lights::new(self.sun.as_ref().and_then(|sun| sun.sun(draw)), []),
             log_exposure: (mean + deviation * exposure) as f32,
             ..Latent::default()
         }
+    }
+
+    /// The derivative with respect to the numbers of a draw of what has this gradient with respect to the vectors: Lᴴ(∂x + i∂y), Kᵀ∂z.
+    #[cfg(feature = "gradients")]
+    pub(crate) fn row(&self, gradient: &[[f32; 3]]) -> Row {
+        let n = self.latent_vectors();
+        let (xy, z) = self.factors();
+        let mut row = Row { w: vec![[0.0; 2]; n], g: vec![0.0; n], ..Row::zero() };
+        for (i, by) in gradient.iter().enumerate() {
+            let [x, y, by_z] = by.map(f64::from);
+            for j in 0..=i {
+                let [re, im] = xy[i * n + j];
+                let sum = &mut row.w[j];
+                *sum = [sum[0] + re * x + im * y, sum[1] + re * y - im * x];
+                row.g[j] += z[i * n + j] * by_z;
+            }
+        }
+        row
+    }
+
+    /// L⁻¹c and K⁻¹(z − μ) of a code's vectors.
+    ///
+    /// # Panics
+    /// If there are not N vectors.
+    pub(super) fn whitened(&self, vectors: &[[f32; 3]]) -> (Vec<Complex>, Vec<f64>) {
+        let (mut c, mut z) = self.centred(vectors);
+        let (xy, factor) = self.factors();
+        let n = self.latent_vectors();
+        cholesky::forward(&xy, n, &mut c);
+        cholesky::forward(&factor, n, &mut z);
+        (c.into_iter().flatten().collect(), z.into_iter().flatten().collect())
+    }
+
+    /// c and z − μ, as right sides of systems of equations.
+    pub(super) fn centred(&self, vectors: &[[f32; 3]]) -> (Vec<[Complex; 1]>, Vec<[f64; 1]>) {
+        let n = self.latent_vectors();
+        assert_eq!(vectors.len(), n, "a prior of {n} vectors");
+        let c = vectors.iter().map(|v| [[f64::from(v[0]), f64::from(v[1])]]).collect();
+        let z = vectors.iter().zip(&self.z_mean).map(|(v, m)| [f64::from(v[2]) - f64::from(*m)]).collect();
+        (c, z)
+    }
+
+    /// L and K.
+    pub(crate) fn factors(&self) -> (Vec<Complex>, Vec<f64>) {
+        let parts = self.xy_real.iter().zip(&self.xy_imaginary);
+        (parts.map(|(re, im)| [f64::from(*re), f64::from(*im)]).collect(), self.z.iter().copied().map(f64::from).collect())
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::environment::EnvironmentMap;
 use super::extract::{Criteria, Extracted, Extraction, Level, SunChoice};
-use super::luminance::luminance;
+use crate::luminance::luminance;
 use super::sh::Sh;
 use std::f32::consts::PI;
 

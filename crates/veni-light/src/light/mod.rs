@@ -18,7 +18,6 @@ mod angle;
 mod environment;
 mod extract;
 mod lit;
-mod luminance;
 #[cfg(feature = "prefilter")]
 mod prefilter;
 mod quadrature;
@@ -31,10 +30,10 @@ mod turn;
 mod vector;
 
 pub use crate::compact::{CompactLight, Disc, Kind, Lights, RadiusSource};
+pub use crate::luminance::{LUMINANCE, luminance};
 pub use environment::EnvironmentMap;
 pub use extract::SunChoice;
 pub use lit::{Light, LightOptions};
-pub use luminance::{LUMINANCE, luminance};
 #[cfg(feature = "prefilter")]
 pub use prefilter::{CubeAxes, CubeMap, Dfg, Law, Levels, Prefilter, lobe_gains};
 pub use quadrature::gauss_legendre;

@@ -96,7 +96,7 @@ impl Model {
             };
             parts.push((name, Part { dtype, shape: &tensor.shape, bytes }));
         }
-        let json = header::to_json(&self.config, &self.info)?;
+        let json = header::to_json(&self.config, &self.info, super::prior::has_sun(&self.tensors))?;
         // collected: the map's type is the standard library's only where some other crate asks safetensors for it
         safetensors::serialize(parts, Some([("veni".to_owned(), json)].into_iter().collect()))
             .map_err(|e| Error::invalid(format!("the model cannot be written: {e}")))

@@ -5,8 +5,11 @@ use serde::{Deserialize, Serialize};
 use super::{ModelConfig, ModelKind};
 use crate::{Error, Result};
 
-/// The format this crate writes, and the only one it reads.
-pub const FORMAT: u32 = 1;
+/// The newest format. It is that of models whose panoramas were without their compact lights, or that know of suns: a program that
+/// knows neither would make skies without light of them.
+pub const FORMAT: u32 = 2;
+/// Of other models, which older programs read too.
+const PLAIN: u32 = 1;
 /// The native frame, the only one weights are stored in.
 const FRAME: &str = "z-up";
 
@@ -64,9 +67,9 @@ struct Format {
     format: u32,
 }
 
-pub(super) fn to_json(config: &ModelConfig, info: &ModelInfo) -> Result<String> {
+pub(super) fn to_json(config: &ModelConfig, info: &ModelInfo, has_sun: bool) -> Result<String> {
     let header = Header {
-        format: FORMAT,
+        format: if config.lights > 0 || has_sun { FORMAT } else { PLAIN },
         kind: config.kind,
         config: config.clone(),
         frame: FRAME.into(),
@@ -78,9 +81,9 @@ pub(super) fn to_json(config: &ModelConfig, info: &ModelInfo) -> Result<String> 
 pub(super) fn from_json(json: &str) -> Result<(ModelConfig, ModelInfo)> {
     let broken = |e: serde_json::Error| Error::invalid(format!("header entry `veni`: {e}"));
     let Format { format } = serde_json::from_str(json).map_err(broken)?;
-    if format != FORMAT {
+    if ![PLAIN, FORMAT].contains(&format) {
         return Err(Error::unsupported(format!(
-            "model format {format} is unknown (this program reads format {FORMAT}); use the program that wrote it"
+            "model format {format} is unknown (this program reads formats {PLAIN} and {FORMAT}); use the program that wrote it"
         )));
     }
     let header: Header = serde_json::from_str(json).map_err(broken)?;

@@ -163,7 +163,7 @@ fn damaged_and_foreign_files_are_refused() {
 #[test]
 fn other_stored_types_are_unsupported() {
     use safetensors::tensor::{Dtype, TensorView};
-    let json = header::to_json(small().config(), small().info()).unwrap();
+    let json = header::to_json(small().config(), small().info(), false).unwrap();
     let view = TensorView::new(Dtype::F64, vec![1], &[0; 8]).unwrap();
     let metadata = Some([("veni".to_owned(), json)].into_iter().collect());
     let bytes = safetensors::serialize([("decoder.output.bias", view)], metadata).unwrap();

@@ -3,7 +3,10 @@
 //! A stream is ChaCha8 keyed by (seed, purpose, step, slot). Nothing has to be saved to continue a run, and
 //! the order in which threads ask changes nothing.
 
+mod exponential;
 mod normal;
+
+pub(crate) use exponential::exp;
 
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};

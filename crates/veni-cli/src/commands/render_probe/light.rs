@@ -35,7 +35,7 @@ pub(super) fn from_file(
 /// The same of a random sky.
 pub(super) fn seeded(seed: u64, model: &ModelArgs, grid: Equirect, turn: f64) -> Result<Vec<[f32; 3]>> {
     let loaded = source::model(model)?;
-    let latent = source::seeded(&loaded.model, seed);
+    let latent = source::RandomSkies::any(&loaded.model).sky(seed)?;
     decode(&loaded, &latent, grid, turn)
 }
 

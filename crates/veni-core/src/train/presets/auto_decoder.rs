@@ -42,7 +42,7 @@ pub(super) fn preset(size: Preset, latent_vectors: usize) -> TrainConfig {
         batch,
         order: Order::Replacement,
         ema_decay: 0.0,
-        model: ModelConfig { kind: ModelKind::Reni, encoder: None, ..veni.model },
+        model: ModelConfig { kind: ModelKind::Reni, lights: 0, encoder: None, ..veni.model },
         augment: AugmentConfig::default(),
         loss_grid: LossGrid::Full,
         loss: LossConfig { mage: off, kld: WeightSchedule::Constant(1e-6), ..LossConfig::reference() },

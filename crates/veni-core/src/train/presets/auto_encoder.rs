@@ -55,7 +55,7 @@ pub(super) fn small(latent_vectors: usize) -> TrainConfig {
         ema_decay: 0.999,
         model: ModelConfig {
             kind: ModelKind::Veni,
-            lights: 0,
+            lights: 1,
             latent_vectors,
             decoder: DecoderConfig::default(),
             encoder: Some(EncoderConfig {
@@ -72,12 +72,14 @@ pub(super) fn small(latent_vectors: usize) -> TrainConfig {
         augment: varied(),
         loss_grid: LossGrid::Strided { factor: 2 },
         // The gradient term is lighter than the paper's: a latent of dimension 27 cannot follow edges. What a viewer sees
-        // (clamped, tonemapped) is asked for directly, which covers most of the colour too.
+        // (clamped, tonemapped) is asked for directly, which covers most of the colour too; and what lights a surface,
+        // since the mean of a logarithm loses the energy of what is small and bright.
         loss: LossConfig {
             mage: WeightSchedule::Constant(0.1),
             cosine: WeightSchedule::Constant(0.1),
             kld: WeightSchedule::Constant(divergence_weight(latent_vectors)),
             ldr_mse: WeightSchedule::Constant(15.0),
+            irradiance: WeightSchedule::Constant(0.5),
             ..LossConfig::default()
         },
         decoder: group(1e-3, [200, steps], 0.01, AdamConfig { weight_decay: 0.01, ..adam }),

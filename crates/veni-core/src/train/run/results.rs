@@ -16,6 +16,7 @@ use veni_data::Reconstruction;
 use veni_data::coarsen::{averaged, coarse_grid};
 use veni_image::metrics::Alignment;
 use veni_light::latent::{Latent, Prior};
+use veni_light::light::Lights;
 use veni_light::model::{Model, ModelInfo, Training};
 use veni_light::output::Overwrite;
 use veni_light::random::{Purpose, stream};
@@ -179,20 +180,25 @@ impl Trainer {
 
     /// The prior of the training panoramas, and the number of latents that it was fitted to.
     fn prior(&self, network: &Network, copies: usize, stop: &AtomicBool) -> Result<(Prior, usize)> {
-        let (codes, variances) = match network {
+        let Codes { codes, variances, own } = match network {
             Network::Veni(veni) => self.encoded(veni, copies, stop)?,
             Network::Reni(reni) => {
                 let rows = table_rows(&reni.latents).into_iter().zip(self.splits.train.items());
-                rows.map(|(row, item)| {
-                    let log_exposure = row.latent.log_exposure + item.log_exposure;
-                    (Latent { log_exposure, ..row.latent }, row.variances)
-                })
-                .unzip()
+                let (codes, variances): (Vec<_>, _) = rows
+                    .map(|(row, item)| {
+                        let log_exposure = row.latent.log_exposure + item.log_exposure;
+                        (Latent { log_exposure, lights: item.lights.clone(), ..row.latent }, row.variances)
+                    })
+                    .unzip();
+                Codes { own: codes.len(), codes, variances }
             }
         };
         let prior = match codes.len() {
             0 | 1 => Prior::standard(network.decoder().latent_vectors()),
-            _ => Prior::fit(&codes, (!variances.is_empty()).then_some(variances.as_slice()))?,
+            _ => {
+                let prior = Prior::fit(&codes, (!variances.is_empty()).then_some(variances.as_slice()))?;
+                if self.config.model.lights > 0 { prior.with_suns_of(&codes[..own]) } else { prior }
+            }
         };
         Ok((prior, codes.len()))
     }
@@ -200,7 +206,7 @@ impl Trainer {
     /// Latents and variances of the training panoramas and `copies` augmented copies of each; of a large set of
     /// [`PRIOR_PANORAMAS`], evenly spread. Generated scenes count only where there is nothing else: a random sky must
     /// be like the photographed ones.
-    fn encoded(&self, veni: &Veni, copies: usize, stop: &AtomicBool) -> Result<(Vec<Latent>, Vec<Vec<f32>>)> {
+    fn encoded(&self, veni: &Veni, copies: usize, stop: &AtomicBool) -> Result<Codes> {
         let train = &self.splits.train;
         let batches = Batches::new(&self.config, veni.stripes()?, train);
         let photographed = train.items().iter().filter(|item| !item.generated).count();
@@ -221,13 +227,16 @@ impl Trainer {
                 let images: Vec<_> = chosen.iter().map(|i| image(*i)).collect();
                 let views: Vec<_> = images.iter().map(Cow::as_ref).collect();
                 for (encoded, i) in veni.encode(train.grid(), &views)?.into_iter().zip(chosen) {
-                    let log_exposure = train.items()[*i].log_exposure;
-                    codes.push(Latent { log_exposure, ..Latent::new(encoded.vectors) });
+                    let item = &train.items()[*i];
+                    // augmentation leaves nothing that says where the sun would be
+                    let lights = if copy == 0 { item.lights.clone() } else { Lights::default() };
+                    let log_exposure = item.log_exposure;
+                    codes.push(Latent { log_exposure, lights, ..Latent::new(encoded.vectors) });
                     variances.extend(encoded.variances);
                 }
             }
         }
-        Ok((codes, variances))
+        Ok(Codes { codes, variances, own: chosen.len() })
     }
 
     pub(super) fn preview(&self, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<()> {
@@ -272,6 +281,15 @@ impl Trainer {
         let veni = Veni::from_model(&model, &self.config.device.device()?)?;
         self.store(&Network::Veni(veni), self.config.report.prior_copies, step, stop, progress)
     }
+}
+
+/// What a prior is fitted to.
+struct Codes {
+    codes: Vec<Latent>,
+    /// For each code the N posterior variances; may be empty.
+    variances: Vec<Vec<f32>>,
+    /// So many codes come first that are of the panoramas themselves, with their lights, and not of augmented copies.
+    own: usize,
 }
 
 /// [`Error::Cancelled`] once `stop` is raised.

@@ -8,7 +8,7 @@ mod sun;
 
 use std::ops::Range;
 
-use super::luminance::luminance;
+use crate::luminance::luminance;
 use crate::compact::{CompactLight, Kind, Lights};
 use crate::light::vector::{angle, dot, normalised};
 use crate::sphere::Equirect;

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::level::View;
-use crate::light::luminance::luminance;
+use crate::luminance::luminance;
 use crate::tasks;
 
 /// Radii of the caps, degrees.

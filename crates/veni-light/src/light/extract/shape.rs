@@ -3,7 +3,7 @@
 use super::level::View;
 use super::measure::Measured;
 use crate::compact::{CompactLight, RadiusSource};
-use crate::light::luminance::luminance;
+use crate::luminance::luminance;
 
 /// A disc of fewer pixels than this in radius has perhaps no pixel that it fills: its peak says nothing about its radiance.
 const FILLS: f64 = 1.3;

@@ -7,7 +7,7 @@ use super::level::View;
 use super::measure::quantile;
 use super::{Found, SunChoice};
 use crate::compact::Kind;
-use crate::light::luminance::luminance;
+use crate::luminance::luminance;
 
 /// Solid angle over which a peak is averaged at least, steradians: a pixel of a panorama of 256 columns.
 const PATCH: f64 = 6.0e-4;

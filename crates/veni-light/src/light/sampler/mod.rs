@@ -12,7 +12,7 @@ use std::f32::consts::{PI, TAU};
 
 use super::EnvironmentMap;
 use super::angle::pixel;
-use super::luminance::luminance;
+use crate::luminance::luminance;
 use super::reduce::Reduced;
 use crate::sphere::Equirect;
 use alias::Alias;

@@ -1,0 +1,185 @@
+//! The sun of a sky, conditioned on its vectors. MODEL (74).
+//!
+//! In the whitened coordinates of [`Prior`], w = L⁻¹c and g = K⁻¹(z − μ), with e, ξ and η (circular complex) standard normal:
+//!
+//! - azimuth φ: the argument of ⟨a, w⟩ + σe,
+//! - measures t = b + B g + S ξ: logit of the sine of the elevation, logarithms of luminance, red/green and blue/green of the
+//!   irradiance at normal incidence before the exposure, and of the angular radius,
+//! - there is a sun where ⟨p, g⟩ + p₀ + η > 0.
+//!
+//! A turn of the code multiplies w by e^{iα} and with it the sun's direction: the density is equivariant, exactly.
+
+mod learn;
+mod request;
+mod tensors;
+
+pub use request::SunRequest;
+pub(crate) use tensors::schema;
+
+use super::draw::Draw;
+use super::prior::Prior;
+use crate::cholesky::Complex;
+use crate::compact::{CompactLight, Kind, RadiusSource};
+use crate::luminance::{LUMINANCE as LUMINANCE_OF, luminance};
+use crate::random::{Stream, exp};
+
+/// Number of measures of a sun.
+pub(crate) const MEASURES: usize = 5;
+/// Place of a measure.
+const ELEVATION: usize = 0;
+const LUMINANCE: usize = 1;
+const COLOUR: [usize; 2] = [2, 3];
+const RADIUS: usize = 4;
+/// A logistic function of 1.702 x is within 0.01 of the normal distribution's at x.
+const LOGIT_TO_PROBIT: f64 = 1.702;
+/// Widest sun that is drawn, radians: 6°.
+const WIDEST: f64 = 6.0 * std::f64::consts::PI / 180.0;
+
+/// Density of a sky's sun given its vectors; see the [module](self).
+#[derive(Clone, Debug, PartialEq)]
+pub struct SunPrior {
+    /// a, [N].
+    azimuth: Vec<[f32; 2]>,
+    /// σ.
+    azimuth_noise: f32,
+    /// B, row-major [MEASURES, N].
+    weights: Vec<f32>,
+    /// b.
+    mean: [f32; MEASURES],
+    /// S, a lower triangle [MEASURES, MEASURES].
+    noise: [[f32; MEASURES]; MEASURES],
+    /// p and p₀, [N + 1].
+    presence: Vec<f32>,
+}
+
+/// The random numbers behind a sun.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct SunDraw {
+    /// η.
+    presence: f64,
+    /// e, E|e|² = 1.
+    azimuth: Complex,
+    /// ξ.
+    measures: [f64; MEASURES],
+}
+
+impl SunDraw {
+    /// Number of its real numbers: presence, then measures.
+    pub(crate) const REAL: usize = 1 + MEASURES;
+
+    pub(super) fn real_mut(&mut self) -> [&mut f64; Self::REAL] {
+        let [a, b, c, d, e] = &mut self.measures;
+        [&mut self.presence, a, b, c, d, e]
+    }
+
+    pub(super) fn new(rng: &mut Stream) -> Self {
+        let [presence, _] = rng.normals();
+        let azimuth = rng.normals().map(|v| v * std::f64::consts::FRAC_1_SQRT_2);
+        let ([a, b], [c, d], [e, _]) = (rng.normals(), rng.normals(), rng.normals());
+        Self { presence, azimuth, measures: [a, b, c, d, e] }
+    }
+}
+
+impl SunPrior {
+    /// N, the number of vectors that it is conditioned on.
+    pub fn latent_vectors(&self) -> usize {
+        self.azimuth.len()
+    }
+
+    /// The sun of a draw, where there is one.
+    pub(super) fn sun(&self, draw: &Draw) -> Option<CompactLight> {
+        if self.score(draw) <= 0.0 {
+            return None;
+        }
+        Some(self.light(self.heading(draw), self.measures(draw)))
+    }
+
+    /// The most likely sun of these vectors, and how likely it is that there is one at all.
+    ///
+    /// # Panics
+    /// If `prior` or `vectors` are not of N vectors.
+    pub fn likely(&self, prior: &Prior, vectors: &[[f32; 3]]) -> (f64, CompactLight) {
+        let (w, g) = prior.whitened(vectors);
+        let draw = Draw { w, g, exposure: 0.0, sun: SunDraw::default() };
+        // the normal distribution's function by the logistic one, as it was fitted
+        let chance = 1.0 / (1.0 + exp(-LOGIT_TO_PROBIT * self.score(&draw)));
+        (chance, self.light(self.heading(&draw), self.measures(&draw)))
+    }
+
+    fn light(&self, [x, y]: Complex, t: [f64; MEASURES]) -> CompactLight {
+        let sine = sine(&t);
+        let length = (x * x + y * y).sqrt();
+        let cosine = (1.0 - sine * sine).sqrt() / length.max(f64::MIN_POSITIVE);
+        let direction = [x * cosine, y * cosine, sine].map(|v| v as f32);
+        let irradiance = irradiance(&t).map(|v| v as f32);
+        let radius = exp(t[RADIUS]).min(WIDEST) as f32;
+        match Kind::of(radius) {
+            // what a photograph's pixels blur is a disc of the sun's true size
+            Kind::Disc => CompactLight {
+                radius_source: RadiusSource::Assumed,
+                ..CompactLight::new(direction, irradiance, CompactLight::SUN_RADIUS)
+            },
+            _ => CompactLight::new(direction, irradiance, radius),
+        }
+    }
+
+    /// ⟨p, g⟩ + p₀ + η: positive where there is a sun.
+    fn score(&self, draw: &Draw) -> f64 {
+        let (weights, bias) = self.presence.split_at(self.latent_vectors());
+        dot(weights, &draw.g) + f64::from(bias[0]) + draw.sun.presence
+    }
+
+    /// ⟨a, w⟩ + σe.
+    fn heading(&self, draw: &Draw) -> Complex {
+        let noise = draw.sun.azimuth.map(|v| f64::from(self.azimuth_noise) * v);
+        self.azimuth.iter().zip(&draw.w).fold(noise, |[x, y], (a, [re, im])| {
+            let [a, b] = a.map(f64::from);
+            [x + a * re - b * im, y + a * im + b * re]
+        })
+    }
+
+    /// t = b + B g + S ξ.
+    pub(crate) fn measures(&self, draw: &Draw) -> [f64; MEASURES] {
+        std::array::from_fn(|k| {
+            f64::from(self.mean[k]) + dot(self.row(k), &draw.g) + dot(&self.noise[k], &draw.sun.measures)
+        })
+    }
+
+    fn row(&self, row: usize) -> &[f32] {
+        let n = self.latent_vectors();
+        &self.weights[row * n..(row + 1) * n]
+    }
+}
+
+impl Prior {
+    /// The density of the sun given the vectors, if one was fitted: random skies then have suns.
+    pub fn sun(&self) -> Option<&SunPrior> {
+        self.sun.as_ref()
+    }
+}
+
+/// Sine of the elevation. Here as below exact operations and our own exponential alone: a seed is a sky on every machine.
+pub(crate) fn sine(t: &[f64; MEASURES]) -> f64 {
+    1.0 / (1.0 + exp(-t[ELEVATION]))
+}
+
+/// Irradiance at normal incidence.
+pub(crate) fn irradiance(t: &[f64; MEASURES]) -> [f64; 3] {
+    let ([r, g, b], [red, blue]) = (LUMINANCE_OF.map(f64::from), COLOUR.map(|c| exp(t[c])));
+    let green = exp(t[LUMINANCE]) / (r * red + g + b * blue);
+    [green * red, green, green * blue]
+}
+
+/// Luminance, and red and blue as multiples of green, of what has all three.
+fn colour([r, g, b]: [f32; 3]) -> Option<(f64, [f64; 2])> {
+    let luminance = f64::from(luminance([r, g, b]));
+    let [r, g, b] = [r, g, b].map(f64::from);
+    (r > 0.0 && g > 0.0 && b > 0.0).then_some((luminance, [r / g, b / g]))
+}
+
+fn dot(a: &[f32], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| f64::from(*a) * b).sum()
+}
+
+#[cfg(test)]
+mod tests;
