@@ -26,7 +26,9 @@ fn only(values: Vec<Value>) -> Value {
 #[test]
 fn the_sun_is_where_it_is_asked_to_be_and_lights_as_asked() {
     let dir = Dir::new();
-    for (seed, sun, overcast) in [("7", [120.0, 35.0], 0.2), ("8", [-30.0, 8.0], 0.5), ("9", [179.0, 70.0], 0.12)] {
+    for (seed, sun, overcast) in
+        [("7", [120.0, 35.0], 0.2), ("8", [-30.0, 8.0], 0.5), ("9", [179.0, 70.0], 0.12)]
+    {
         let (sun_text, share) = (format!("{},{}", sun[0], sun[1]), overcast.to_string());
         let asked = ["--sun", &sun_text, "--overcast", &share];
         let out = format!("{seed}.exr");
@@ -69,14 +71,16 @@ fn with_a_sun_or_without() {
 #[test]
 fn a_time_and_a_place() {
     let dir = Dir::new();
-    let args = ["bake", "--seed", "7", "-o", "noon.exr", "--size", "256", "--date", "2026-03-20T12:07Z", "--place"];
+    let args =
+        ["bake", "--seed", "7", "-o", "noon.exr", "--size", "256", "--date", "2026-03-20T12:07Z", "--place"];
     let run = dir.run(&[&args[..], &["50,0"]].concat());
     assert!(run.code == Some(0) && run.err.contains("the sun is at -9"), "{}", run.err);
     let light = only(dir.json(&["light", "noon.exr"]));
     let found = [number(&light["sun"], "azimuth"), number(&light["sun"], "elevation")];
     // due south is at the right quarter, as on a map whose middle column is east
     assert!(apart(found, [-90.0, 40.0]) < 2.0, "{light}");
-    let night = ["bake", "--seed", "7", "-o", "night.exr", "--size", "64", "--date", "2026-03-20T00:07Z", "--place"];
+    let night =
+        ["bake", "--seed", "7", "-o", "night.exr", "--size", "64", "--date", "2026-03-20T00:07Z", "--place"];
     let run = dir.run(&[&night[..], &["50,0"]].concat());
     assert!(run.code == Some(0) && run.err.contains("below the horizon"), "{}", run.err);
 }

@@ -58,7 +58,9 @@ impl FromStr for Place {
                 Ok(Self { latitude, longitude })
             }
             Some(_) => Err("the latitude is within 90 degrees, the longitude within 180".to_owned()),
-            None => Err(format!("'{text}' is not a place: give latitude and longitude in degrees, like 48.1,11.6")),
+            None => Err(format!(
+                "'{text}' is not a place: give latitude and longitude in degrees, like 48.1,11.6"
+            )),
         }
     }
 }
@@ -79,7 +81,8 @@ pub(crate) fn sun(Time(time): Time, Place { latitude, longitude }: Place) -> Res
 /// own solar time. The first and the last are a little after and before: with the sun above the horizon.
 pub(crate) fn daylight(Day(date): Day, place: Place, count: usize) -> Result<Vec<(Time, [f64; 2])>> {
     let offset = (place.longitude * HOURS_PER_DEGREE * 3600.0).round() as i32;
-    let zone = FixedOffset::east_opt(offset).ok_or_else(|| anyhow!("no solar time at {}°", place.longitude))?;
+    let zone =
+        FixedOffset::east_opt(offset).ok_or_else(|| anyhow!("no solar time at {}°", place.longitude))?;
     let midnight = date.and_time(NaiveTime::MIN).and_local_timezone(zone).single();
     let midnight = midnight.ok_or_else(|| anyhow!("{date} has no midnight"))?;
     let at = |minute: f64| Time(midnight + Duration::milliseconds((minute * 60_000.0) as i64));
@@ -124,7 +127,8 @@ mod tests {
     fn compass_directions_are_those_of_a_map() {
         // noon at the equator's equinox is overhead; morning is east, evening west
         let at = |text: &str| sun(text.parse().unwrap(), place("50,0")).unwrap();
-        let [morning, noon, evening] = ["2026-03-20T06:30Z", "2026-03-20T12:07Z", "2026-03-20T17:45Z"].map(at);
+        let [morning, noon, evening] =
+            ["2026-03-20T06:30Z", "2026-03-20T12:07Z", "2026-03-20T17:45Z"].map(at);
         assert!(morning[0].abs() < 10.0 && morning[1] > 0.0, "{morning:?}");
         assert!((noon[0] + 90.0).abs() < 1.0 && (noon[1] - 40.0).abs() < 1.0, "{noon:?}");
         assert!(evening[0].abs() > 170.0 && evening[1] > 0.0, "{evening:?}");

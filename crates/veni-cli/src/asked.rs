@@ -57,9 +57,8 @@ fn sun(text: &str) -> Result<Sun, String> {
         "none" => return Ok(Sun::None),
         _ => {}
     }
-    let (azimuth, elevation) = text
-        .split_once(',')
-        .ok_or("give azimuth and elevation in degrees, like 120,35; or any, or none")?;
+    let (azimuth, elevation) =
+        text.split_once(',').ok_or("give azimuth and elevation in degrees, like 120,35; or any, or none")?;
     let angles = [finite(azimuth)?, finite(elevation)?];
     if angles[1] > 0.0 && angles[1] <= 90.0 {
         Ok(Sun::At(angles))
@@ -155,7 +154,8 @@ pub(crate) fn measured(latent: &Latent, device: &Device) -> Result<SkyMeasures> 
 /// Measures, for people.
 pub(crate) fn in_words(measures: &SkyMeasures) -> String {
     let sun = measures.sun.map_or_else(|| "no sun".to_owned(), sun_in_words);
-    let warmth = measures.temperature.map_or_else(|| "no colour temperature".to_owned(), |t| format!("{t:.0} K"));
+    let warmth =
+        measures.temperature.map_or_else(|| "no colour temperature".to_owned(), |t| format!("{t:.0} K"));
     format!("{sun}, overcast {:.3}, {warmth}", measures.overcast)
 }
 

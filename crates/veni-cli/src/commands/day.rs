@@ -99,8 +99,14 @@ impl Day {
             let request = wishes.request_at(angles);
             let mut latent = RandomSkies::new(&loaded, request)?.sky(self.seed)?;
             latent.log_exposure += (self.exposure * std::f64::consts::LN_2) as f32;
-            let baked =
-                self.pictures.write(&files, [&latent, &latent], &picture, (&device, &loaded.model), overwrite, report)?;
+            let baked = self.pictures.write(
+                &files,
+                [&latent, &latent],
+                &picture,
+                (&device, &loaded.model),
+                overwrite,
+                report,
+            )?;
             let measures = asked::measured(&latent, &device)?;
             let human = format!(
                 "{}: {time}, {}; came: {} ({:.2} s on {})",

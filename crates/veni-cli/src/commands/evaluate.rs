@@ -13,7 +13,8 @@ use veni_eval::codec::Codec;
 use veni_eval::lpips::{self, Lpips};
 use veni_eval::protocol::{
     Evaluation, Published, Report as Findings, Settings, Share, ablations, consistency, dataset_size,
-    equivariance, interpolation, inverse_rendering, light, paper, reconstruction, uniqueness,
+    equivariance, interpolation, inverse_rendering, light, paper, realism, reconstruction, spheres,
+    uniqueness,
 };
 use veni_eval::store::Store;
 use veni_eval::table::{Format, Table};
@@ -146,9 +147,13 @@ pub(crate) enum Protocol {
     Ablations,
     /// Irradiance and the sun of decoded panoramas against the panoramas' own
     Light,
+    /// Three balls under decoded light and under the panoramas' own, as light estimation is judged
+    Spheres,
+    /// Random skies against photographed ones: sun, shadows, patches
+    Realism,
     /// The light on a rendered ball (inverse rendering), from dull to shiny
     InverseRendering,
-    /// All of them but light, with published numbers to compare with
+    /// All of them but light, spheres and realism, with published numbers to compare with
     Paper,
 }
 
@@ -284,6 +289,8 @@ impl Protocol {
             Self::DatasetSize => dataset_size::run(evaluation),
             Self::Ablations => ablations::run(evaluation),
             Self::Light => light::run(evaluation),
+            Self::Spheres => spheres::run(evaluation),
+            Self::Realism => realism::run(evaluation),
             Self::InverseRendering => inverse_rendering::run(evaluation),
             Self::Paper => paper::run(evaluation, published),
         }
@@ -296,10 +303,11 @@ impl Protocol {
             Self::Uniqueness => uniqueness::keep(evaluation, share),
             Self::Consistency => consistency::keep(evaluation, share),
             Self::Interpolation => interpolation::keep(evaluation, share),
-            Self::Equivariance => Ok(()),
+            Self::Equivariance | Self::Realism => Ok(()),
             Self::DatasetSize => dataset_size::keep(evaluation, share),
             Self::Ablations => ablations::keep(evaluation, share),
             Self::Light => light::keep(evaluation, share),
+            Self::Spheres => spheres::keep(evaluation, share),
             Self::InverseRendering => inverse_rendering::keep(evaluation, share),
             Self::Paper => paper::keep(evaluation, share),
         }

@@ -184,8 +184,23 @@ impl Fit {
                 let lit = Lit::new(&picture, most).map_err(|e| e.in_file(path))?;
                 let rest = lit.rest.as_ref().unwrap_or(&picture);
                 let observation = self.input.observe(rest, grid).map_err(|e| e.in_file(path))?;
+                let (mask, view) = (observation.mask.clone(), self.input.view());
                 let mut fitted = self.fit(path, observation, model, config, report)?;
                 lit.put_into(&mut fitted.best);
+                if lit.rest.is_none() {
+                    let is_seen = |direction| match (view, &mask) {
+                        (Some(view), _) => {
+                            let [width, height] = picture.size();
+                            view.pixel_of(direction, width, height).is_some()
+                        }
+                        (None, Some(mask)) => {
+                            let [column, row] = grid.pixel(direction).map(|v| v as usize);
+                            mask[row.min(grid.height - 1) * grid.width + column] > 0.5
+                        }
+                        (None, None) => true,
+                    };
+                    self.lit.guess(&model.prior(), &mut fitted.best, is_seen, report)?;
+                }
                 if !lit.lights.is_empty() && fitted.scores.is_some() {
                     let whole = self.input.observe(&picture, grid).map_err(|e| e.in_file(path))?;
                     fitted.scores = Some(model.score(&fitted.best.latent, &whole)?);

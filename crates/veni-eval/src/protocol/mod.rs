@@ -10,8 +10,10 @@
 //! | [`dataset_size`] | what is more training data worth? |
 //! | [`ablations`] | what is each part of the model worth? |
 //! | [`light`] | does what is decoded light things as the panorama does? |
+//! | [`spheres`] | do three balls look as they do under the panorama? |
+//! | [`realism`] | are random skies like photographed ones? |
 //! | [`inverse_rendering`] | what does the rendered image of a ball tell of the light on it? |
-//! | [`paper`] | all of them but `light`, with published numbers beside ours |
+//! | [`paper`] | all of them but `light`, `spheres` and `realism`, with published numbers beside ours |
 //!
 //! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image; a
 //! [`Share`] of it can be computed beforehand, elsewhere.
@@ -24,10 +26,13 @@ pub mod interpolation;
 pub mod inverse_rendering;
 pub mod light;
 pub mod paper;
+mod patches;
 mod published;
 mod quality;
+pub mod realism;
 pub mod reconstruction;
 mod share;
+pub mod spheres;
 #[cfg(test)]
 mod tests;
 pub mod uniqueness;

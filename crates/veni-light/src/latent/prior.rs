@@ -196,7 +196,10 @@ impl Prior {
     /// L and K.
     pub(crate) fn factors(&self) -> (Vec<Complex>, Vec<f64>) {
         let parts = self.xy_real.iter().zip(&self.xy_imaginary);
-        (parts.map(|(re, im)| [f64::from(*re), f64::from(*im)]).collect(), self.z.iter().copied().map(f64::from).collect())
+        (
+            parts.map(|(re, im)| [f64::from(*re), f64::from(*im)]).collect(),
+            self.z.iter().copied().map(f64::from).collect(),
+        )
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::environment::EnvironmentMap;
 use super::extract::{Criteria, Extracted, Extraction, Level, SunChoice};
-use crate::luminance::luminance;
 use super::sh::Sh;
+use crate::luminance::luminance;
 use std::f32::consts::PI;
 
 use crate::compact::{CompactLight, Lights, RadiusSource};

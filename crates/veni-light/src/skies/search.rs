@@ -21,7 +21,12 @@ const STRIDE: f64 = 0.5;
 const DIFFERENCE: f64 = 1e-4;
 
 /// Draws a code and moves it.
-pub(super) fn search(request: &SkyRequest, decoder: &Decoder, prior: &Prior, rng: &mut Stream) -> Result<Latent> {
+pub(super) fn search(
+    request: &SkyRequest,
+    decoder: &Decoder,
+    prior: &Prior,
+    rng: &mut Stream,
+) -> Result<Latent> {
     let mut draw = prior.draw(rng);
     if let (Some(sun), Some(azimuth)) = (prior.sun(), request.sun.azimuth) {
         sun.head(azimuth, &mut draw);

@@ -1,11 +1,8 @@
 //! Correlated colour temperature. MODEL (76).
 
 /// Linear Rec. 709 (D65) to CIE 1931 X, Y, Z (IEC 61966-2-1).
-const XYZ: [[f64; 3]; 3] = [
-    [0.4123908, 0.3575843, 0.1804808],
-    [0.2126390, 0.7151687, 0.0721923],
-    [0.0193308, 0.1191948, 0.9505322],
-];
+const XYZ: [[f64; 3]; 3] =
+    [[0.4123908, 0.3575843, 0.1804808], [0.2126390, 0.7151687, 0.0721923], [0.0193308, 0.1191948, 0.9505322]];
 /// A formula in the inverse slope n = (x − x₀)/(y − y₀) of the line from where the lines of equal temperature about meet.
 struct Epicentre {
     x: f64,
@@ -18,7 +15,7 @@ const CUBIC: [f64; 4] = [-449.0, 3525.0, -6823.3, 5520.33];
 /// Javier Hernández-Andrés, Raymond L. Lee and Javier Romero, Applied Optics 38 (1999): A + Σ A_k e^{−n/t_k}, from 3000 K on.
 const COLD: Epicentre = Epicentre { x: 0.3366, y: 0.1735 };
 const CONSTANT: f64 = -949.863_15;
-const EXPONENTIALS: [[f64; 2]; 3] = [[6253.803_38, 0.921_59], [28.705_99, 0.200_39], [4e-5, 0.071_25]];
+const EXPONENTIALS: [[f64; 2]; 3] = [[6_253.803_38, 0.921_59], [28.705_99, 0.200_39], [4e-5, 0.071_25]];
 /// From here on the second formula holds.
 const CHANGE: f64 = 6000.0;
 /// Below and above there is no telling black bodies apart, kelvin.
@@ -67,8 +64,10 @@ mod tests {
                 lobe(nm, [1.056, 599.8, 1.0 / 37.9, 1.0 / 31.0])
                     + lobe(nm, [0.362, 442.0, 1.0 / 16.0, 1.0 / 26.7])
                     + lobe(nm, [-0.065, 501.1, 1.0 / 20.4, 1.0 / 26.2]),
-                lobe(nm, [0.821, 568.8, 1.0 / 46.9, 1.0 / 40.5]) + lobe(nm, [0.286, 530.9, 1.0 / 16.3, 1.0 / 31.1]),
-                lobe(nm, [1.217, 437.0, 1.0 / 11.8, 1.0 / 36.0]) + lobe(nm, [0.681, 459.0, 1.0 / 26.0, 1.0 / 13.8]),
+                lobe(nm, [0.821, 568.8, 1.0 / 46.9, 1.0 / 40.5])
+                    + lobe(nm, [0.286, 530.9, 1.0 / 16.3, 1.0 / 31.1]),
+                lobe(nm, [1.217, 437.0, 1.0 / 11.8, 1.0 / 36.0])
+                    + lobe(nm, [0.681, 459.0, 1.0 / 26.0, 1.0 / 13.8]),
             ];
             xyz = [0, 1, 2].map(|c| xyz[c] + planck * matching[c]);
         }

@@ -62,7 +62,8 @@ fn without_a_sun_there_is_none() {
 fn a_moving_sun_makes_no_jumps() {
     let (decoder, prior) = ready();
     let at = |t: f64| {
-        let sun = SunRequest { azimuth: Some(2.0 - 4.0 * t), elevation: Some(0.02 + t), ..SunRequest::default() };
+        let sun =
+            SunRequest { azimuth: Some(2.0 - 4.0 * t), elevation: Some(0.02 + t), ..SunRequest::default() };
         let request = SkyRequest { sun, overcast: Some(0.25), ..SkyRequest::default() };
         request.draw(&decoder, &prior, &mut Stream::from_seed(5)).unwrap()
     };

@@ -4,6 +4,7 @@ use clap::{Args, value_parser};
 use veni_fit::Best;
 use veni_image::Picture;
 use veni_light::Result;
+use veni_light::latent::{Latent, Prior};
 use veni_light::light::{LightOptions, Lights};
 use veni_light::sphere::Equirect;
 
@@ -15,6 +16,11 @@ pub(super) struct LitArgs {
     /// the latent [default: as many as the model was trained without]
     #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8), conflicts_with_all = ["fov", "mask", "normals"])]
     compact_lights: Option<u8>,
+
+    /// Of a photograph or part of a panorama that does not show the sun: put the sun into the latent that the model thinks most
+    /// likely given what is seen, if it thinks that there is one at all
+    #[arg(long, conflicts_with = "compact_lights")]
+    likely_sun: bool,
 }
 
 impl LitArgs {
@@ -31,6 +37,42 @@ impl LitArgs {
             );
         }
         if whole { most } else { 0 }
+    }
+
+    /// The likely sun of every latent of a fit, if that is asked for. `is_seen`: whether a direction is in the picture, where a
+    /// sun would have been seen.
+    pub(super) fn guess(
+        &self,
+        prior: &Prior,
+        best: &mut Best,
+        is_seen: impl Fn([f32; 3]) -> bool,
+        report: Report,
+    ) -> anyhow::Result<()> {
+        if !self.likely_sun {
+            return Ok(());
+        }
+        let Some(sun) = prior.sun() else {
+            anyhow::bail!("--likely-sun: the model knows nothing of suns; name another with --model");
+        };
+        let likely = |latent: &Latent| {
+            let (chance, light) = sun.likely(prior, &latent.vectors);
+            (chance > 0.5 && !is_seen(light.direction)).then_some((chance, light))
+        };
+        for latent in &mut best.all {
+            latent.lights = Lights::new(likely(latent).map(|(_, light)| light), []);
+        }
+        let found = likely(&best.latent);
+        match &found {
+            Some((chance, light)) => report.note(format_args!(
+                "a sun at {:.0}°, {:.0}° is likely ({:.0} %)",
+                light.azimuth().to_degrees(),
+                light.elevation().to_degrees(),
+                100.0 * chance
+            )),
+            None => report.note("no sun is likely where none is seen"),
+        }
+        best.latent.lights = Lights::new(found.map(|(_, light)| light), []);
+        Ok(())
     }
 }
 

@@ -133,9 +133,10 @@ impl Ridge {
             let mut conjugate: Vec<[Complex; 1]> = x.iter().map(|[a, b]| [[*a, -b]]).collect();
             cholesky::forward(&gram, n, &mut conjugate);
             let leverage = mean + conjugate.iter().map(|[[a, b]]| a * a + b * b).sum::<f64>();
-            let [re, im] = x.iter().zip(&weights).fold([0.0; 2], |[re, im], ([a, b], [c, d])| {
-                [re + a * c - b * d, im + a * d + b * c]
-            });
+            let [re, im] = x
+                .iter()
+                .zip(&weights)
+                .fold([0.0; 2], |[re, im], ([a, b], [c, d])| [re + a * c - b * d, im + a * d + b * c]);
             [s - re, t - im].map(|v| v / (1.0 - leverage))
         };
         let residuals = features.iter().zip(targets).map(|(x, y)| residual(x, *y)).collect();
@@ -173,14 +174,17 @@ fn presence(features: &[Vec<f64>], present: &[bool]) -> Vec<f64> {
         samples.map(one).sum::<f64>()
     };
     let validated = |share: f64| {
-        (0..PARTS).map(|k| loss(&logistic(&part(k, false).collect::<Vec<_>>(), n, share), &mut part(k, true))).sum::<f64>()
+        (0..PARTS)
+            .map(|k| loss(&logistic(&part(k, false).collect::<Vec<_>>(), n, share), &mut part(k, true)))
+            .sum::<f64>()
     };
     let (best, share) = PENALTIES
         .iter()
         .map(|share| (validated(*share), *share))
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .unwrap_or((f64::INFINITY, 1.0));
-    let base: f64 = [(with, with / count), (count - with, 1.0 - with / count)].iter().map(|(k, p)| -k * p.ln()).sum();
+    let base: f64 =
+        [(with, with / count), (count - with, 1.0 - with / count)].iter().map(|(k, p)| -k * p.ln()).sum();
     if best >= base {
         return alone();
     }

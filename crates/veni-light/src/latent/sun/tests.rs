@@ -70,9 +70,17 @@ fn turning_the_codes_turns_the_suns_and_changes_no_fit() {
     assert!(a.azimuth.as_flattened().iter().zip(b.azimuth.as_flattened()).all(|(a, b)| (a - b).abs() < 1e-5));
     assert_eq!((a.weights, a.presence), (b.weights, b.presence));
     // a break: suns that did not turn with their codes say nothing
-    let still = codes.iter().zip(&turned).map(|(code, turned)| Latent { lights: code.lights.clone(), ..turned.clone() });
+    let still = codes
+        .iter()
+        .zip(&turned)
+        .map(|(code, turned)| Latent { lights: code.lights.clone(), ..turned.clone() });
     let broken = SunPrior::fit(&still.collect::<Vec<_>>(), &Prior::standard(N)).unwrap();
-    assert!(broken.azimuth_noise > 0.9 && a.azimuth_noise < 0.7, "{} {}", broken.azimuth_noise, a.azimuth_noise);
+    assert!(
+        broken.azimuth_noise > 0.9 && a.azimuth_noise < 0.7,
+        "{} {}",
+        broken.azimuth_noise,
+        a.azimuth_noise
+    );
 }
 
 #[test]
@@ -81,7 +89,8 @@ fn too_few_suns_teach_nothing() {
     assert!(SunPrior::fit(&codes[..7], &Prior::standard(N)).is_none());
     let some = SunPrior::fit(&codes[..8], &Prior::standard(N)).unwrap();
     assert!(some.presence[..N].iter().all(|p| *p == 0.0) && some.presence[N] > 0.5, "{some:?}");
-    let dark: Vec<_> = codes.iter().map(|code| Latent { lights: Lights::default(), ..code.clone() }).collect();
+    let dark: Vec<_> =
+        codes.iter().map(|code| Latent { lights: Lights::default(), ..code.clone() }).collect();
     assert!(SunPrior::fit(&dark, &Prior::standard(N)).is_none());
 }
 
@@ -138,7 +147,13 @@ fn conditioned_codes_are_those_that_happen_to_fulfil_it() {
         let mean = |value: &dyn Fn(&Latent) -> f64| codes.iter().map(value).sum::<f64>() / codes.len() as f64;
         let z = |code: &Latent| f64::from(code.vectors[0][2]);
         let e = |code: &Latent| f64::from(crate::light::luminance(code.lights[0].irradiance)).ln();
-        [mean(&z), mean(&|code| z(code).powi(2)), mean(&e), mean(&|code| e(code).powi(2)), mean(&|code| z(code) * e(code))]
+        [
+            mean(&z),
+            mean(&|code| z(code).powi(2)),
+            mean(&e),
+            mean(&|code| e(code).powi(2)),
+            mean(&|code| z(code) * e(code)),
+        ]
     };
     for (a, b) in statistics(&asked).into_iter().zip(statistics(&happened)) {
         assert!((a - b).abs() < 0.05, "{a} {b}");

@@ -1,8 +1,8 @@
 //! One candidate at one scale: what surrounds it, what exceeds that, and where the middle of the excess is.
 
 use super::level::{Cell, View};
-use crate::luminance::{LUMINANCE, luminance};
 use crate::light::vector::{angle, normalised};
+use crate::luminance::{LUMINANCE, luminance};
 
 /// Excess below this part of the largest does not move the centre: what is around a light is lit by it, and not evenly.
 const CORE: f64 = 0.25;

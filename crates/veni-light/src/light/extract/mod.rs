@@ -8,9 +8,9 @@ mod sun;
 
 use std::ops::Range;
 
-use crate::luminance::luminance;
 use crate::compact::{CompactLight, Kind, Lights};
 use crate::light::vector::{angle, dot, normalised};
+use crate::luminance::luminance;
 use crate::sphere::Equirect;
 use crate::tasks;
 pub(super) use level::Level;

@@ -12,8 +12,8 @@ use std::f32::consts::{PI, TAU};
 
 use super::EnvironmentMap;
 use super::angle::pixel;
-use crate::luminance::luminance;
 use super::reduce::Reduced;
+use crate::luminance::luminance;
 use crate::sphere::Equirect;
 use alias::Alias;
 
