@@ -79,7 +79,7 @@ pub(super) fn small(latent_vectors: usize) -> TrainConfig {
             cosine: WeightSchedule::Constant(0.1),
             kld: WeightSchedule::Constant(divergence_weight(latent_vectors)),
             ldr_mse: WeightSchedule::Constant(15.0),
-            irradiance: WeightSchedule::Constant(0.5),
+            irradiance: WeightSchedule::Constant(2.0),
             ..LossConfig::default()
         },
         decoder: group(1e-3, [200, steps], 0.01, AdamConfig { weight_decay: 0.01, ..adam }),
