@@ -57,10 +57,8 @@ impl Store {
             Err(e) => return Err(Error::io(&path, "read", e)),
         };
         let damaged = |why: String| {
-            Error::invalid(format!(
-                "{}: no kept result ({why}); remove the file to compute it again",
-                path.display()
-            ))
+            Error::invalid(format!("no kept result ({why}); remove the file to compute it again"))
+                .in_file(&path)
         };
         let kept: Kept<T> = serde_json::from_slice(&bytes).map_err(|e| damaged(e.to_string()))?;
         if kept.key != key.decides {
@@ -79,7 +77,7 @@ impl Store {
         fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         let kept = Kept { key: key.decides.clone(), value };
         let text = serde_json::to_vec(&kept)
-            .map_err(|e| Error::invalid(format!("{}: cannot be written as JSON: {e}", path.display())))?;
+            .map_err(|e| Error::invalid(format!("cannot be written as JSON: {e}")).in_file(&path))?;
         write_atomic(&path, Overwrite::Replace, |file| {
             file.write_all(&text).map_err(|e| Error::io(&path, "write", e))
         })

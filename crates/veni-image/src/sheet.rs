@@ -84,15 +84,14 @@ pub fn write_png(
 ) -> Result<()> {
     let broken = |e: png::EncodingError| match e {
         png::EncodingError::IoError(e) => Error::io(path, "write", e),
-        other => Error::invalid(format!("{}: PNG: {other}", path.display())),
+        other => Error::invalid(format!("PNG: {other}")).in_file(path),
     };
     if pixels.len() != width * height {
         let count = pixels.len();
-        return Err(Error::invalid(format!("{}: {count} pixels for {width} × {height}", path.display())));
+        return Err(Error::invalid(format!("{count} pixels for {width} × {height}")).in_file(path));
     }
     let side = |n: usize| {
-        u32::try_from(n)
-            .map_err(|_| Error::invalid(format!("{}: {n} is too long a side for PNG", path.display())))
+        u32::try_from(n).map_err(|_| Error::invalid(format!("{n} is too long a side for PNG")).in_file(path))
     };
     let (width, height) = (side(width)?, side(height)?);
     write_atomic(path, overwrite, |file| {

@@ -18,11 +18,11 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     let mut subjects = Vec::new();
     for subject in run.subjects {
         let size = subject.training_panoramas().ok_or_else(|| {
-            Error::invalid(format!(
-                "{}: its file does not say on how many panoramas it was trained; leave this model out, or train it \
-                 anew: a training run records it",
-                subject.name()
-            ))
+            Error::invalid(
+                "its file does not say on how many panoramas it was trained; leave this model out, or train it anew: a \
+                 training run records it",
+            )
+            .in_file(subject.name())
         })?;
         subjects.push((size, subject));
     }

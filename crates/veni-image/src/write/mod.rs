@@ -80,10 +80,7 @@ impl WriteFormat {
             Some("exr") => Ok(Self::Exr(Precision::Half)),
             Some("hdr") => Ok(Self::Hdr),
             Some("png") => Ok(Self::Png(tonemap)),
-            _ => Err(Error::unsupported(format!(
-                "{}: panoramas are written as .exr, .hdr or .png",
-                path.display()
-            ))),
+            _ => Err(Error::unsupported("panoramas are written as .exr, .hdr or .png").in_file(path)),
         }
     }
 }
@@ -200,8 +197,7 @@ pub fn write_rows(
         WriteFormat::Png(tonemap) => png::write(file, path, grid, tonemap, options, run),
     });
     result.map_err(|e| match e {
-        // write_atomic names the path in its own refusal
-        Error::Invalid(m) if !m.starts_with(&path.display().to_string()) => Error::Invalid(m).in_file(path),
+        Error::Invalid { .. } => e.in_file(path),
         other => other,
     })
 }

@@ -118,7 +118,7 @@ impl FitModel {
 #[cfg(feature = "learn")]
 fn decoder(model: &Model) -> veni_light::Result<Decoder> {
     match model.decoder() {
-        Err(veni_light::Error::Unsupported(_)) => {
+        Err(veni_light::Error::Unsupported { .. }) => {
             let device = veni_core::train::config::DeviceKind::Flex.device()?;
             Ok(Decoder::Graph(Box::new(veni_core::vae::Decoder::from_model(model, &device)?)))
         }
