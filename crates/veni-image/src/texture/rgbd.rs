@@ -15,8 +15,9 @@ pub fn rgbd(texel: [f32; 3]) -> [u8; 4] {
     [colour[0], colour[1], colour[2], (d * 255.0).round() as u8]
 }
 
-/// Radiance of a texel.
-pub fn from_rgbd([r, g, b, d]: [u8; 4]) -> [f32; 3] {
+/// Radiance of a texel, as a renderer decodes it.
+#[cfg(test)]
+pub(crate) fn from_rgbd([r, g, b, d]: [u8; 4]) -> [f32; 3] {
     [r, g, b].map(|v| (f32::from(v) / 255.0).powf(2.2) / (f32::from(d) / 255.0))
 }
 
