@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use veni_light::digest::Digest;
 
+use crate::canonical::Canonical;
 use crate::{Error, Result};
 use veni_light::output::{Overwrite, below, write_atomic};
 
@@ -30,12 +30,12 @@ pub struct Key {
     /// What people call it: the beginning of the file's name.
     pub name: String,
     /// Everything that decides the value.
-    pub decides: Value,
+    pub decides: Canonical,
 }
 
 #[derive(Serialize, Deserialize)]
 struct Kept<T> {
-    key: Value,
+    key: Canonical,
     value: T,
 }
 
@@ -98,7 +98,8 @@ mod tests {
     use serde_json::json;
 
     fn key(steps: u64) -> Key {
-        Key { protocol: "fit", name: "a sky/α".to_owned(), decides: json!({ "steps": steps, "rate": 0.1 }) }
+        let decides = Canonical::of(json!({ "steps": steps, "rate": 0.1 }));
+        Key { protocol: "fit", name: "a sky/α".to_owned(), decides }
     }
 
     #[test]

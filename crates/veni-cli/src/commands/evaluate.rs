@@ -191,8 +191,7 @@ impl Evaluate {
         inputs::check_folder(&self.out)?;
         let device = DeviceKind::Flex;
         let subjects = inputs::subjects(&self.models, device)?;
-        let lpips =
-            if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
+        let lpips = if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, device)?) };
         let data = Dataset::load_observed(&files, grid, &self.layer.options(), &bars);
         bars.end();
         let data = data.map_err(with_remedy)?;

@@ -9,6 +9,7 @@ use serde_json::json;
 use super::work::Work;
 use super::{Evaluation, Report, Share};
 use crate::figure::{Axis, Plot, Series};
+use crate::canonical::Canonical;
 use crate::store::Key;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
@@ -144,10 +145,10 @@ fn distances<'a>(
     let key = |block: &std::ops::Range<usize>| Key {
         protocol: "consistency",
         name: format!("{}-{label}-{}", subject.name(), block.start),
-        decides: json!({
+        decides: Canonical::of(json!({
             "model": subject.identity(), "latents": label, "seed": seed,
             "first": block.start, "end": block.end, "grid": [grid.width, grid.height],
-        }),
+        })),
     };
     let keys: Vec<_> = blocks.iter().map(key).collect();
     let task = format!("{}, {BATCH} pairs each", subject.name());

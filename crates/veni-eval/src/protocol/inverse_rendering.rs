@@ -12,6 +12,7 @@ use super::quality::{self, Quality, rate};
 use super::work::{Work, images};
 use super::{Evaluation, Report, Share};
 use crate::figure::{Axis, Plot, Series, Sheet, display};
+use crate::canonical::Canonical;
 use crate::store::Key;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
@@ -153,10 +154,10 @@ fn fits<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel, set: Set, ks: f32) -
         .map(|(item, image)| Key {
             protocol: "inverse-rendering",
             name: format!("{}-{}-ks{ks}", item.name(), subject.name()),
-            decides: json!({
+            decides: Canonical::of(json!({
                 "model": subject.identity(), "set": [set.side, set.lights], "steps": set.steps, "prior": PRIOR,
                 "ks": ks, "shininess": SHININESS, "image": image,
-            }),
+            })),
         })
         .collect();
     let task = format!("{}, K_s = {ks}", subject.name());

@@ -11,6 +11,7 @@ use super::work::{Work, images};
 use crate::Result;
 use crate::codec::Codec;
 use crate::lpips::Lpips;
+use crate::canonical::Canonical;
 use crate::store::Key;
 use crate::table::Cell;
 use veni_data::Item;
@@ -87,7 +88,7 @@ pub(super) fn coding<'a>(run: &Evaluation<'a>, codec: &'a dyn Codec) -> Work<'a,
     let key = |(item, image): (&Item, serde_json::Value)| Key {
         protocol: "reconstruction",
         name: format!("{}-{}-{}", item.name(), codec.system(), codec.pass()),
-        decides: json!({ "codec": codec.key(), "image": image }),
+        decides: Canonical::of(json!({ "codec": codec.key(), "image": image })),
     };
     let keys: Vec<_> = items.iter().zip(images(run)).map(key).collect();
     let task = format!("{}, {}", codec.system(), codec.pass());

@@ -12,6 +12,7 @@ use super::work::{Work, images};
 use super::{Evaluation, Report, Share};
 use crate::figure::{Sheet, display, heat};
 use crate::fitting::FitSettings;
+use crate::canonical::Canonical;
 use crate::store::Key;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
@@ -122,9 +123,9 @@ fn pairs<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel) -> Work<'a, Pair> {
         .map(|(item, image)| Key {
             protocol: "uniqueness",
             name: format!("{}-{}", item.name(), subject.name()),
-            decides: json!({
+            decides: Canonical::of(json!({
                 "model": subject.identity(), "fit": fit.key(), "seed": seed, "image": image,
-            }),
+            })),
         })
         .collect();
     let task = format!("{}, two fits", subject.name());
