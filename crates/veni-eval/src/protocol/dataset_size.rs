@@ -4,11 +4,12 @@
 //! one in the model file; models of one D are joined to a curve.
 
 use super::quality::{self, reconstruct};
-use super::{Evaluation, Report, Share, reconstruction};
+use super::{Evaluation, Report, reconstruction};
 use crate::figure::{Axis, Plot, Series};
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
 use veni_core::LoadedModel;
+use veni_data::Part;
 
 /// Table: reconstruction per number of training panoramas; LDR PSNR (exposure) as curves.
 ///
@@ -66,8 +67,8 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As coding and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    reconstruction::keep_models(run, share)
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    reconstruction::keep_models(run, part)
 }
 
 fn curve(subject: &LoadedModel, pass: &str) -> String {

@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::quality::{self, Quality, rate};
 use super::work::{Work, images};
-use super::{Evaluation, Report, Share};
+use super::{Evaluation, Report};
 use crate::figure::{Axis, Plot, Series, Sheet, display};
 use crate::canonical::Canonical;
 use crate::store::Key;
@@ -18,7 +18,7 @@ use crate::table::{Cell, Table};
 use crate::{Error, Result};
 use veni_core::LoadedModel;
 use veni_core::fit::{FitConfig, FitResult, fit_shaded, matching_exposure};
-use veni_data::Item;
+use veni_data::{Item, Part};
 use veni_fit::shade::{
     Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedImage, ShadedLoss, ShadingForm, Surface,
     Transfer,
@@ -140,10 +140,10 @@ fn mean(rows: &[One]) -> One {
 ///
 /// # Errors
 /// As rendering, fitting and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
     let set = if run.settings.quick { QUICK } else { WHOLE };
     for subject in run.subjects {
-        set.sweep.iter().try_for_each(|ks| fits(run, subject, set, *ks).keep(run, share))?;
+        set.sweep.iter().try_for_each(|ks| fits(run, subject, set, *ks).keep(run, part))?;
     }
     Ok(())
 }

@@ -14,7 +14,8 @@
 //! | [`paper`] | all of them but `light`, with published numbers beside ours |
 //!
 //! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image; a
-//! [`Share`] of it can be computed beforehand, elsewhere.
+//! [`Part`](veni_data::Part) of it can be computed beforehand by `keep`, in processes that know nothing of each other, without tables or
+//! figures. Once all parts are there, `run` finds them and makes both.
 
 pub mod ablations;
 pub mod consistency;
@@ -27,7 +28,6 @@ pub mod paper;
 mod published;
 mod quality;
 pub mod reconstruction;
-mod share;
 #[cfg(test)]
 mod tests;
 pub mod uniqueness;
@@ -36,7 +36,6 @@ mod work;
 use std::path::{Path, PathBuf};
 
 pub use published::Published;
-pub use share::Share;
 
 use super::codec::{Autoencoder, Codec, Optimised};
 use super::figure::{Plot, Sheet};

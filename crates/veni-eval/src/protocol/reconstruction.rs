@@ -4,12 +4,12 @@
 //! fitted from there; the bases given beside), decoded, and scored under both definitions of the metrics.
 
 use super::quality::{self, Reconstructed, coding, reconstruct};
-use super::{Evaluation, Report, Share};
+use super::{Evaluation, Report};
 use crate::Result;
 use crate::codec::Codec;
 use crate::figure::{HEAT_RANGE, Sheet, display, heat};
 use crate::table::{Cell, Table};
-use veni_data::Item;
+use veni_data::{Item, Part};
 
 /// Table 1: means per codec; table 2: every panorama; a sheet per system: target, reconstructions, their errors; and of several
 /// systems a sheet with the last pass of each side by side.
@@ -47,15 +47,15 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As coding and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    keep_models(run, share)?;
-    run.others.iter().try_for_each(|codec| coding(run, *codec).keep(run, share))
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    keep_models(run, part)?;
+    run.others.iter().try_for_each(|codec| coding(run, *codec).keep(run, part))
 }
 
 /// The models' own passes.
-pub(super) fn keep_models(run: &Evaluation<'_>, share: Share) -> Result<()> {
+pub(super) fn keep_models(run: &Evaluation<'_>, part: Part) -> Result<()> {
     for subject in run.subjects {
-        run.codecs(subject).iter().try_for_each(|codec| coding(run, &**codec).keep(run, share))?;
+        run.codecs(subject).iter().try_for_each(|codec| coding(run, &**codec).keep(run, part))?;
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::work::{Work, images};
-use super::{Evaluation, Report, Share};
+use super::{Evaluation, Report};
 use crate::figure::{Sheet, display, heat};
 use crate::fitting::FitSettings;
 use crate::canonical::Canonical;
@@ -17,6 +17,7 @@ use crate::store::Key;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
 use veni_core::LoadedModel;
+use veni_data::Part;
 use veni_image::metrics::{log_error, weighted_log_error};
 use veni_light::digest::Digest;
 use veni_light::latent::Latent;
@@ -100,8 +101,8 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As fitting and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    run.subjects.iter().try_for_each(|subject| pairs(run, subject).keep(run, share))
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    run.subjects.iter().try_for_each(|subject| pairs(run, subject).keep(run, part))
 }
 
 /// The reference implementation's rates for the two kinds of models.
