@@ -267,13 +267,13 @@ impl Fit {
         });
         bars.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
-        let scores = match (partial, observation.clipped.is_some()) {
+        let scores = match (partial, observation.clipped().is_some()) {
             (false, false) => Some(model.score(&best.latent, &observation)?),
             _ => None,
         };
         // from the image's exposure 0 to its own
         for latent in best.all.iter_mut().chain([&mut best.latent]) {
-            latent.log_exposure += observation.log_exposure;
+            latent.log_exposure += observation.log_exposure();
         }
         let known = Some(observation.share());
         Ok(Fitted { best, known, scores, seconds: started.elapsed().as_secs_f64() })
@@ -347,7 +347,7 @@ impl Fit {
             Start::Encoder if !has_encoder => {
                 bail!("{}: this model has no encoder: use --start zero or noise", model.name())
             }
-            Start::Encoder => model.encode(observation.grid, &observation.log_radiance)?,
+            Start::Encoder => model.encode(observation.grid(), observation.log_radiance())?,
         };
         let rest = count - usize::from(first.is_some());
         let random = random_starts(&model.prior(), 0.0, rest, self.settings.seed());
