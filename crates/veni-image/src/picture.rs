@@ -79,7 +79,7 @@ impl Picture {
             }
         };
         let size = [panorama.grid.width, panorama.grid.height];
-        let Panorama { pixels, known, notes, .. } = panorama;
+        let crate::Panorama { pixels, known, notes, .. } = panorama;
         let picture = Self { size, pixels, known, clip: None, notes };
         Ok(match clip {
             Some(clip) => picture.clipped_at(clip),
