@@ -1,11 +1,11 @@
-//! Contact sheets: several 8-bit pictures of one size, side by side in one PNG. And the one place where 8-bit sRGB pictures
-//! become PNG files.
+//! Contact sheets: several 8-bit pictures of one size, side by side in one PNG; and any 8-bit sRGB picture as a PNG file.
 
 use std::io::Write;
 use std::path::Path;
 
 use veni_light::output::{Overwrite, write_atomic};
 
+use crate::encoder::encoder;
 use crate::{Error, Result};
 
 /// Pixels between pictures.
@@ -90,15 +90,8 @@ pub fn write_png(
         let count = pixels.len();
         return Err(Error::invalid(format!("{count} pixels for {width} × {height}")).in_file(path));
     }
-    let side = |n: usize| {
-        u32::try_from(n).map_err(|_| Error::invalid(format!("{n} is too long a side for PNG")).in_file(path))
-    };
-    let (width, height) = (side(width)?, side(height)?);
     write_atomic(path, overwrite, |file| {
-        let mut encoder = png::Encoder::new(&mut *file, width, height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let encoder = encoder(&mut *file, [width, height], png::ColorType::Rgb).map_err(|e| e.in_file(path))?;
         let mut writer = encoder.write_header().map_err(broken)?;
         writer.write_image_data(pixels.as_flattened()).map_err(broken)?;
         writer.finish().map_err(broken)?;
