@@ -12,7 +12,7 @@ use std::path::Path;
 use super::tonemap::Tonemap;
 use crate::numbered;
 use crate::panorama::Panorama;
-use crate::provenance::{Digest, PIXEL_DIGEST};
+use crate::provenance::{PixelDigest, PIXEL_DIGEST};
 use crate::{Error, Result};
 use veni_light::output::{Overwrite, write_atomic};
 use veni_light::sphere::Equirect;
@@ -42,7 +42,7 @@ fn texts(options: &WriteOptions, factor: f32, room: impl Fn(&str) -> usize) -> R
         all.insert(RADIANCE_SCALE.to_owned(), factor.to_string());
     }
     if !all.is_empty() {
-        all.insert(PIXEL_DIGEST.to_owned(), Digest::BLANK.to_owned());
+        all.insert(PIXEL_DIGEST.to_owned(), PixelDigest::BLANK.to_owned());
     }
     numbered::split(&all, room)
 }
