@@ -62,6 +62,16 @@ impl Sheet {
         }
     }
 
+    /// Width and height of the whole, in pixels.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// All pixels, sRGB, row-major from the top left.
+    pub fn pixels(&self) -> &[[u8; 3]] {
+        &self.pixels
+    }
+
     /// Writes the PNG.
     ///
     /// # Errors

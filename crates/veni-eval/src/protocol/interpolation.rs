@@ -8,7 +8,7 @@
 use super::quality::{codes, coding};
 use super::{Evaluation, Report};
 use crate::codec::{Autoencoder, Codec, Optimised, model::latent};
-use crate::figure::{Axis, Plot, Series, Sheet, display};
+use crate::figure::{Axis, Plot, Series, LabelledSheet, display};
 use crate::fitting::FitSettings;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
@@ -138,7 +138,7 @@ fn draw(run: &Evaluation<'_>, subject: &LoadedModel, ways: &[Way], report: &mut 
     let last = (run.settings.frames - 1) as f64;
     let titles: Vec<_> = (0..run.settings.frames).map(|k| format!("t = {:.2}", k as f64 / last)).collect();
     let names: Vec<_> = ways.iter().map(|way| format!("{} - {}", way.from, way.to)).collect();
-    let mut sheet = Sheet::new(grid, &titles, &names);
+    let mut sheet = LabelledSheet::new(grid, &titles, &names);
     for (row, way) in ways.iter().enumerate() {
         for (column, frame) in way.frames.iter().enumerate() {
             sheet.place(column, row, &display(grid, frame));

@@ -11,7 +11,7 @@ use serde_json::json;
 use super::quality::{self, Quality, rate};
 use super::work::{Work, images};
 use super::{Evaluation, Report};
-use crate::figure::{Axis, Plot, Series, Sheet, display};
+use crate::figure::{Axis, Plot, Series, LabelledSheet, display};
 use crate::canonical::Canonical;
 use crate::store::Key;
 use crate::table::{Cell, Table};
@@ -216,7 +216,7 @@ fn fitted(subject: &LoadedModel, grid: Equirect, item: &Item, set: Set, ks: f32)
 
 /// Panorama, and the light found for each K_s.
 struct Balls {
-    sheet: Sheet,
+    sheet: LabelledSheet,
 }
 
 impl Balls {
@@ -224,7 +224,7 @@ impl Balls {
         let titles =
             std::iter::once("panorama".to_owned()).chain(set.sweep.iter().map(|ks| format!("K_s = {ks}")));
         let names: Vec<_> = run.data.items().iter().map(Item::name).collect();
-        Self { sheet: Sheet::new(run.data.grid(), &titles.collect::<Vec<_>>(), &names) }
+        Self { sheet: LabelledSheet::new(run.data.grid(), &titles.collect::<Vec<_>>(), &names) }
     }
 
     fn place(&mut self, run: &Evaluation<'_>, at: usize, row: usize, item: &Item, image: &[f32]) {

@@ -38,7 +38,7 @@ use std::path::{Path, PathBuf};
 pub use published::Published;
 
 use super::codec::{Autoencoder, Codec, Optimised};
-use super::figure::{Plot, Sheet};
+use super::figure::{Plot, LabelledSheet};
 use super::fitting::FitSettings;
 use super::lpips::Lpips;
 use super::store::Store;
@@ -134,7 +134,7 @@ impl<'a> Evaluation<'a> {
         Ok(())
     }
 
-    fn sheet(&self, name: &str, sheet: &Sheet, report: &mut Report) -> Result<()> {
+    fn sheet(&self, name: &str, sheet: &LabelledSheet, report: &mut Report) -> Result<()> {
         let path = self.figures.join(format!("{}.png", file_name(name)));
         sheet.write(&path)?;
         report.figures.push(path);

@@ -7,7 +7,7 @@ use super::quality::{self, Reconstructed, coding, reconstruct};
 use super::{Evaluation, Report};
 use crate::Result;
 use crate::codec::Codec;
-use crate::figure::{HEAT_RANGE, Sheet, display, heat};
+use crate::figure::{HEAT_RANGE, LabelledSheet, display, heat};
 use crate::table::{Cell, Table};
 use veni_data::{Item, Part};
 
@@ -89,12 +89,12 @@ fn system(
     Ok(results.pop().map(|(_, last)| (name.to_owned(), last.images)))
 }
 
-fn side_by_side(run: &Evaluation<'_>, columns: &[Column]) -> Sheet {
+fn side_by_side(run: &Evaluation<'_>, columns: &[Column]) -> LabelledSheet {
     let (grid, items) = (run.data.grid(), run.data.items());
     let titles = columns.iter().map(|(system, _)| system.clone());
     let titles: Vec<_> = std::iter::once("panorama".to_owned()).chain(titles).collect();
     let names: Vec<_> = items.iter().map(Item::name).collect();
-    let mut sheet = Sheet::new(grid, &titles, &names);
+    let mut sheet = LabelledSheet::new(grid, &titles, &names);
     for (row, item) in items.iter().enumerate() {
         let images = std::iter::once(item.log_radiance.as_slice())
             .chain(columns.iter().map(|(_, images)| images[row].as_slice()));
@@ -105,13 +105,13 @@ fn side_by_side(run: &Evaluation<'_>, columns: &[Column]) -> Sheet {
     sheet
 }
 
-fn sheet(run: &Evaluation<'_>, results: &[(&str, Reconstructed)]) -> Sheet {
+fn sheet(run: &Evaluation<'_>, results: &[(&str, Reconstructed)]) -> LabelledSheet {
     let (grid, items) = (run.data.grid(), run.data.items());
     let titles =
         results.iter().flat_map(|(pass, _)| [(*pass).to_owned(), format!("error, 0 to {HEAT_RANGE}")]);
     let titles: Vec<_> = std::iter::once("panorama".to_owned()).chain(titles).collect();
     let names: Vec<_> = items.iter().map(Item::name).collect();
-    let mut sheet = Sheet::new(grid, &titles, &names);
+    let mut sheet = LabelledSheet::new(grid, &titles, &names);
     for (row, item) in items.iter().enumerate() {
         sheet.place(0, row, &display(grid, &item.log_radiance));
         for (at, (_, result)) in results.iter().enumerate() {

@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::work::{Work, images};
 use super::{Evaluation, Report};
-use crate::figure::{Sheet, display, heat};
+use crate::figure::{LabelledSheet, display, heat};
 use crate::fitting::FitSettings;
 use crate::canonical::Canonical;
 use crate::store::Key;
@@ -156,7 +156,7 @@ fn measure(
     let (grid, items) = (run.data.grid(), run.data.items());
     let titles = ["panorama", "first fit", "second fit", "midpoint", "first - midpoint"].map(str::to_owned);
     let names: Vec<_> = items.iter().map(veni_data::Item::name).collect();
-    let mut sheet = Sheet::new(grid, &titles, &names);
+    let mut sheet = LabelledSheet::new(grid, &titles, &names);
     let mut measured = Vec::with_capacity(pairs.len());
     for (row, (item, pair)) in items.iter().zip(pairs).enumerate() {
         let (first, second) = (Latent::new(pair.first.clone()), Latent::new(pair.second.clone()));
