@@ -36,7 +36,8 @@ mod tests {
     /// Kept results are found by this text: it must not change.
     #[test]
     fn the_text_does_not_depend_on_the_order_in_which_settings_are_named() {
-        let one = Canonical::of(json!({ "steps": 3, "fit": Canonical::of(json!({ "rate": 0.1, "a": null })) }));
+        let one =
+            Canonical::of(json!({ "steps": 3, "fit": Canonical::of(json!({ "rate": 0.1, "a": null })) }));
         assert_eq!(one.to_string(), r#"{"fit":{"a":null,"rate":0.1},"steps":3}"#);
         assert_eq!(one, serde_json::from_str(r#"{"steps": 3, "fit": {"rate": 0.1, "a": null}}"#).unwrap());
     }

@@ -101,7 +101,8 @@ pub fn write_png(
         return Err(Error::invalid(format!("{count} pixels for {width} × {height}")).in_file(path));
     }
     write_atomic(path, overwrite, |file| {
-        let encoder = encoder(&mut *file, [width, height], png::ColorType::Rgb).map_err(|e| e.in_file(path))?;
+        let encoder =
+            encoder(&mut *file, [width, height], png::ColorType::Rgb).map_err(|e| e.in_file(path))?;
         let mut writer = encoder.write_header().map_err(broken)?;
         writer.write_image_data(pixels.as_flattened()).map_err(broken)?;
         writer.finish().map_err(broken)?;

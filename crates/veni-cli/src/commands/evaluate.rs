@@ -12,8 +12,8 @@ use veni_data::{Dataset, Fold, Part};
 use veni_eval::codec::Codec;
 use veni_eval::lpips::{self, Lpips};
 use veni_eval::protocol::{
-    Evaluation, Published, Report as Findings, Settings, ablations, consistency, dataset_size,
-    equivariance, interpolation, inverse_rendering, light, paper, reconstruction, uniqueness,
+    Evaluation, Published, Report as Findings, Settings, ablations, consistency, dataset_size, equivariance,
+    interpolation, inverse_rendering, light, paper, reconstruction, uniqueness,
 };
 use veni_eval::store::Store;
 use veni_eval::table::{Format, Table};

@@ -3,8 +3,8 @@
 use serde_json::json;
 
 use super::Codec;
-use crate::fitting::FitSettings;
 use crate::canonical::Canonical;
+use crate::fitting::FitSettings;
 use crate::{Error, Result};
 use veni_core::LoadedModel;
 use veni_light::latent::Latent;

@@ -8,8 +8,8 @@ use serde_json::json;
 
 use super::work::Work;
 use super::{Evaluation, Report};
-use crate::figure::{Axis, Plot, Series};
 use crate::canonical::Canonical;
+use crate::figure::{Axis, Plot, Series};
 use crate::store::Key;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};

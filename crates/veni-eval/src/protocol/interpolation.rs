@@ -8,7 +8,7 @@
 use super::quality::{codes, coding};
 use super::{Evaluation, Report};
 use crate::codec::{Autoencoder, Codec, Optimised, model::latent};
-use crate::figure::{Axis, Plot, Series, LabelledSheet, display};
+use crate::figure::{Axis, LabelledSheet, Plot, Series, display};
 use crate::fitting::FitSettings;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};

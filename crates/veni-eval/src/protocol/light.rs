@@ -10,8 +10,8 @@ use super::{Evaluation, Report, reconstruction};
 use crate::Result;
 use crate::codec::Codec;
 use crate::table::{Cell, Table};
-use veni_data::{Item, Part};
 use veni_data::parallel::parallel;
+use veni_data::{Item, Part};
 use veni_light::light::{CompactLight, EnvironmentMap, LightOptions, luminance};
 use veni_light::sphere::{Equirect, ways};
 

@@ -38,7 +38,7 @@ use std::path::{Path, PathBuf};
 pub use published::Published;
 
 use super::codec::{Autoencoder, Codec, Optimised};
-use super::figure::{Plot, LabelledSheet};
+use super::figure::{LabelledSheet, Plot};
 use super::fitting::FitSettings;
 use super::lpips::Lpips;
 use super::store::Store;

@@ -5,8 +5,8 @@
 
 use super::published::Published;
 use super::{
-    Evaluation, Report, ablations, consistency, dataset_size, equivariance, interpolation,
-    inverse_rendering, reconstruction, uniqueness,
+    Evaluation, Report, ablations, consistency, dataset_size, equivariance, interpolation, inverse_rendering,
+    reconstruction, uniqueness,
 };
 use crate::Result;
 use veni_data::Part;

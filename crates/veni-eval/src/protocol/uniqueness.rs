@@ -10,9 +10,9 @@ use serde_json::json;
 
 use super::work::{Work, images};
 use super::{Evaluation, Report};
+use crate::canonical::Canonical;
 use crate::figure::{LabelledSheet, display, heat};
 use crate::fitting::FitSettings;
-use crate::canonical::Canonical;
 use crate::store::Key;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};

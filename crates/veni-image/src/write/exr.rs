@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::half_range::{Dark, HALF_RANGE};
 use super::{Accept, HalfRange, Precision, SOFTWARE, WriteOptions, texts};
 use crate::colour::REC709;
-use crate::provenance::{PixelDigest, PIXEL_DIGEST};
+use crate::provenance::{PIXEL_DIGEST, PixelDigest};
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 

@@ -5,7 +5,7 @@ use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::{Accept, SOFTWARE, WriteOptions, texts};
-use crate::provenance::{PixelDigest, PIXEL_DIGEST};
+use crate::provenance::{PIXEL_DIGEST, PixelDigest};
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 

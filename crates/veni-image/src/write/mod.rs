@@ -12,7 +12,7 @@ use std::path::Path;
 use super::tonemap::Tonemap;
 use crate::numbered;
 use crate::panorama::Panorama;
-use crate::provenance::{PixelDigest, PIXEL_DIGEST};
+use crate::provenance::{PIXEL_DIGEST, PixelDigest};
 use crate::{Error, Result};
 use veni_light::output::{Overwrite, write_atomic};
 use veni_light::sphere::Equirect;

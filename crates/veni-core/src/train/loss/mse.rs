@@ -1,9 +1,9 @@
 //! Mean squared errors in three spaces, with an optional mask. MODEL (31).
 
 use super::LossForm;
-use veni_image::tonemap::srgb::{GAMMA, KNEE, OFFSET, SCALE, SLOPE};
 use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};
+use veni_image::tonemap::srgb::{GAMMA, KNEE, OFFSET, SCALE, SLOPE};
 
 /// Where radiance is compared. Inputs are log radiance always.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -32,11 +32,8 @@ pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -
     // the decoder's own view of the header: a damaged one may be walked through otherwise before
     precheck::room(Some([grid.width as u64, grid.height as u64]), options)?;
     let attributes = text(&header);
-    let meaning = if options.data {
-        Meaning::linear()
-    } else {
-        tags::meaning(&header, &attributes, choice.coloured)?
-    };
+    let meaning =
+        if options.data { Meaning::linear() } else { tags::meaning(&header, &attributes, choice.coloured)? };
     let mut panorama = Panorama::new(grid, vec![[0.0; 3]; grid.len()]);
     let mut known = stored_window(&header, grid, choice.alpha.is_some());
     pixels::read(reader, path, &choice, &header, &mut panorama.pixels, known.as_deref_mut(), grid)?;
