@@ -1,3 +1,4 @@
+// Generated from crates/veni-gpu/shaders by the example 6_wgsl: do not edit.
 // The VENI decoder as a function: fn veni_radiance(direction: vec3f) -> vec3f, for N = 9, h = 128, 6 layers.
 // Declare veni_matrices, veni_vectors and veni_latents as read-only storage buffers; see below.
 

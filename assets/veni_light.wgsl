@@ -1,3 +1,4 @@
+// Generated from crates/veni-gpu/shaders by the example 6_wgsl: do not edit.
 // Importance sampling of a light: veni_sample_light, veni_light_pdf, veni_light_radiance, veni_sun, veni_irradiance.
 // Declare veni_light, veni_light_cells and veni_light_texels; see below.
 

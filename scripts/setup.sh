@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs what the tests need beyond Rust. Debian and Ubuntu are served; elsewhere it says what to install.
-#   scripts/setup.sh [--targets TARGET…]    also the standard library of other targets (.ci/run)
+#   scripts/setup.sh [--tools] [--targets TARGET…]    also typos and cargo-deny, and the standard library of other targets
+#                                                     (.ci/run)
 set -euo pipefail
 
 # A C compiler links Rust programs; criterion and the command line need nothing else.
@@ -34,6 +35,17 @@ fi
 if ! command -v cargo >/dev/null; then
     echo "setup: Rust is missing: https://rustup.rs (veni needs $(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml) or newer)" >&2
     exit 1
+fi
+
+# Spelling, licences and advisories. Once built they stay in cargo's folder; without the registry CI says what it leaves out.
+if [[ ${1:-} == --tools ]]; then
+    shift
+    missing=()
+    command -v typos >/dev/null || missing+=(typos-cli)
+    cargo deny --version >/dev/null 2>&1 || missing+=(cargo-deny)
+    if ((${#missing[@]})) && [[ ${VENI_SKIP_TOOLS:-0} != 1 ]]; then
+        cargo install --locked --quiet "${missing[@]}" || echo "setup: cannot be installed now: ${missing[*]}" >&2
+    fi
 fi
 
 if [[ ${1:-} == --targets && ${VENI_SKIP_TARGETS:-0} != 1 ]]; then

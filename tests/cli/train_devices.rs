@@ -144,7 +144,7 @@ fn without_a_graphics_device_auto_takes_the_processor_and_wgpu_is_refused() {
     assert_eq!(configured(&dir, "run", "decoder_by"), "kernels");
 }
 
-/// Two updates on the graphics device from the panoramas to the model, and on from its checkpoint.
+/// Two updates on the graphics device from the panoramas to the model.
 #[cfg(all(feature = "wgpu", feature = "gpu"))]
 #[test]
 fn a_run_on_a_graphics_device_is_the_run_on_the_processor() {
@@ -180,4 +180,52 @@ fn a_run_on_a_graphics_device_is_the_run_on_the_processor() {
     dir.ok(&args(&data, "auto", "auto"));
     let chosen = if software { "flex" } else { "wgpu" };
     assert!([chosen, "cuda"].contains(&configured(&dir, "auto", "device").as_str()));
+}
+
+/// Two stages on the graphics device, killed in the second: what goes on from the checkpoint is the run that was left alone.
+#[cfg(all(unix, feature = "wgpu", feature = "gpu"))]
+#[test]
+fn stages_on_a_graphics_device_go_on_from_their_checkpoint() {
+    use std::process::Stdio;
+    use std::time::{Duration, Instant};
+    if crate::gpu::skipped("stages_on_a_graphics_device_go_on_from_their_checkpoint") {
+        return;
+    }
+    let dir = Dir::new();
+    let data = text(panoramas());
+    let more = ["--device", "wgpu", "--pretrain-synthetic", "2", "--pretrain-steps", "2"];
+    let often = ["--set", "report.checkpoint_every=1"];
+    let args = |out: &'static str| [&train_args(&data, out, "40")[..], &more, &often].concat();
+    dir.ok(&args("whole"));
+    let mut command = dir.command(&args("parts"));
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let started = Instant::now();
+    let log = dir.path("parts/metrics.jsonl");
+    let logged = || std::fs::read_to_string(&log).map_or(0, |text| text.matches("\"loss\"").count());
+    while logged() < 5 {
+        assert!(started.elapsed() < Duration::from_secs(180), "no five steps in three minutes");
+        assert!(child.try_wait().unwrap().is_none(), "the run ended by itself");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let before = logged();
+    assert!(before < 42, "killed too late for the test to say anything");
+
+    dir.ok(&["train", "--resume", "--out", "parts", "--quiet"]);
+    assert_eq!(configured(&dir, "parts", "device"), "wgpu");
+    let (left_alone, gone_on) = (losses(&dir, "whole"), losses(&dir, "parts"));
+    assert_eq!((left_alone.len(), gone_on.len()), (42, 42), "every step is logged once");
+    let log = std::fs::read_to_string(&log).unwrap();
+    assert_eq!(log.matches("\"stage\":\"pretrain\"").count(), 2, "{log}");
+    assert_eq!(log.matches("\"stage\":\"finetune\"").count(), 40, "{log}");
+    // a device may add in another order from run to run, and Adam's steps do not shrink with a gradient
+    let apart = |from: usize, to: usize| {
+        let pairs = left_alone[from..to].iter().zip(&gone_on[from..to]);
+        pairs.map(|(a, b)| (a - b).abs() / a).fold(0.0, f64::max)
+    };
+    assert!(apart(0, 1) < 2e-5 && apart(1, 10) < 2e-2, "{left_alone:?} {gone_on:?}");
+    // the panoramas of a step, and the weights they meet, show in its loss
+    let steps = left_alone.windows(2).map(|pair| (pair[0] - pair[1]).abs() / pair[0]);
+    assert!(steps.fold(0.0, f64::max) > 0.1, "no step could be mistaken for another: {left_alone:?}");
 }

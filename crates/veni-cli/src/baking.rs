@@ -131,7 +131,7 @@ impl Pictures {
                     });
                     precision = Precision::Float;
                 }
-                (Err(error @ veni_light::Error::Invalid(_)), Some(value)) if self.half => {
+                (Err(error @ veni_light::Error::Invalid { .. }), Some(value)) if self.half => {
                     let change = if value > HALF_RANGE[1] {
                         "darken with --exposure -1 …"
                     } else {

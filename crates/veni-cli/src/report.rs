@@ -78,7 +78,7 @@ impl Report {
 
 /// The whole error chain in one line, so that a log keeps it together.
 pub(crate) fn error(error: &anyhow::Error) {
-    complain(&format!("veni-cli: {}", one_line(&format!("{error:#}"))));
+    complain(&format!("veni-cli: {}", chain(error)));
 }
 
 /// Prints what is wrong with the command line, or the help that was asked for, and ends.
@@ -114,6 +114,20 @@ pub(crate) fn last_of(mut errors: Vec<anyhow::Error>) -> anyhow::Result<Outcome>
     let last = errors.pop();
     errors.iter().for_each(error);
     last.map_or(Ok(Outcome::Fine), Err)
+}
+
+/// An error and what caused it. A cause whose words stand there already is not said twice: graphics devices' errors have
+/// those of their causes in their own.
+fn chain(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain().map(|cause| one_line(&cause.to_string())) {
+        if text.is_empty() {
+            text = cause;
+        } else if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
 }
 
 fn one_line(text: &str) -> String {
@@ -169,7 +183,9 @@ mod tests {
     #[test]
     fn an_error_chain_is_one_line() {
         let error = anyhow::anyhow!("line one\n  line two").context("outer");
-        assert_eq!(one_line(&format!("{error:#}")), "outer: line one line two");
+        assert_eq!(chain(&error), "outer: line one line two");
+        let error = anyhow::anyhow!("full").context("disk: full").context("outer");
+        assert_eq!(chain(&error), "outer: disk: full");
     }
 
     #[test]

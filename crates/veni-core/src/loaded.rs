@@ -51,7 +51,7 @@ impl LoadedModel {
         // networks that do not fold are evaluated as graphs of tensors
         let field = match model.decoder() {
             Ok(field) => Some(field),
-            Err(Error::Unsupported(_)) => None,
+            Err(Error::Unsupported { .. }) => None,
             Err(error) => return Err(error),
         };
         let decoder = if model.has_encoder() {
@@ -163,7 +163,7 @@ impl LoadedModel {
     /// As [`LoadedModel::encode`].
     pub fn encode_rest(&self, grid: Equirect, images: &[&[f32]]) -> Result<Vec<Vec<[f32; 3]>>> {
         let veni =
-            self.veni().ok_or_else(|| Error::invalid(format!("{}: this model has no encoder", self.name)))?;
+            self.veni().ok_or_else(|| Error::invalid("this model has no encoder").in_file(&self.name))?;
         Ok(veni.encode(grid, images)?.into_iter().map(|e| e.vectors).collect())
     }
 

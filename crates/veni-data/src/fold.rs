@@ -8,16 +8,14 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use veni_light::digest::Digest;
 
+use crate::part::{Part, numbers};
 use crate::prepare::capture;
 use crate::{Error, Result};
 
-/// Part I of N, written `I/N` with I from 1: what is held back while the other parts are trained on.
+/// The [`Part`] that is held back while the other parts are trained on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
-pub struct Fold {
-    number: usize,
-    of: usize,
-}
+pub struct Fold(Part);
 
 impl Fold {
     /// Part `number` (from 1) of `of` (2 or more).
@@ -25,12 +23,12 @@ impl Fold {
     /// # Errors
     /// [`Error::Invalid`] if there is no such part.
     pub fn new(number: usize, of: usize) -> Result<Self> {
-        if of < 2 || number == 0 || number > of {
-            return Err(Error::invalid(format!(
+        let part = Part::new(number, of, "fold").ok().filter(|part| part.of() > 1);
+        part.map(Self).ok_or_else(|| {
+            Error::invalid(format!(
                 "fold {number}/{of}: give I/N with N of 2 or more and I of 1 to N, such as 1/4"
-            )));
-        }
-        Ok(Self { number, of })
+            ))
+        })
     }
 
     /// Which of the files are held back. Files of one [`capture`] are in the same part; captures are dealt in the order of a
@@ -42,14 +40,14 @@ impl Fold {
         for name in &captures {
             *sizes.entry((Digest::of(name), name)).or_default() += 1;
         }
-        let mut filled = vec![0; self.of];
+        let mut filled = vec![0; self.0.of()];
         let mut part_of = BTreeMap::new();
         for ((_, name), size) in sizes {
-            let part = (0..self.of).min_by_key(|part| filled[*part]).unwrap_or_default();
+            let part = (0..filled.len()).min_by_key(|part| filled[*part]).unwrap_or_default();
             filled[part] += size;
             part_of.insert(name, part);
         }
-        captures.iter().map(|name| part_of[name.as_str()] == self.number - 1).collect()
+        captures.iter().map(|name| part_of[name.as_str()] == self.0.number() - 1).collect()
     }
 
     /// The files held back and the others.
@@ -82,17 +80,16 @@ impl FromStr for Fold {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let numbers = text.split_once('/').map(|(number, of)| (number.trim().parse(), of.trim().parse()));
-        match numbers {
-            Some((Ok(number), Ok(of))) => Self::new(number, of),
-            _ => Err(Error::invalid(format!("fold {text:?}: give I/N, such as 1/4"))),
+        match numbers(text) {
+            Some([number, of]) => Self::new(number, of),
+            None => Err(Error::invalid(format!("fold {text:?}: give I/N, such as 1/4"))),
         }
     }
 }
 
 impl fmt::Display for Fold {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.number, self.of)
+        self.0.fmt(f)
     }
 }
 

@@ -33,5 +33,5 @@ pub(crate) fn at_most(what: &str, value: u64, limit: u64) -> Result<()> {
     if value <= limit {
         return Ok(());
     }
-    Err(Error::too_large(format!("{value} {what} is more than the limit of {limit}")))
+    Err(Error::beyond(format!("{value} {what} is more than the limit of {limit}"), value, limit))
 }

@@ -42,14 +42,14 @@ impl PixelStore {
         let free = fs4::available_space(folder).map_err(|e| Error::io(folder, HOLD, e))?;
         if free < bytes {
             return Err(Error::invalid(format!(
-                "{}: {} of space are left, and {panoramas} panoramas of {} × {} pixels take {}; free some, name another \
+                "{} of space are left, and {panoramas} panoramas of {} × {} pixels take {}; free some, name another \
                  folder with data.scratch, or keep more in memory than data.memory_mib = {memory_mib}",
-                folder.display(),
                 size(free),
                 grid.width,
                 grid.height,
                 size(bytes)
-            )));
+            ))
+            .in_file(folder));
         }
         let file = tempfile::tempfile_in(folder).map_err(|e| Error::io(folder, HOLD, e))?;
         Ok(Self { values, scratch: Some(Scratch { folder: folder.to_path_buf(), file: Mutex::new(file) }) })

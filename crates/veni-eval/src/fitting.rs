@@ -1,8 +1,9 @@
 //! The one place where evaluation calls the latent optimiser.
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::Result;
+use crate::canonical::Canonical;
 use veni_core::LoadedModel;
 use veni_core::fit::{self, FitConfig, FitResult, FitTarget, Method};
 use veni_data::coarsen::{averaged, coarse_grid};
@@ -36,8 +37,8 @@ impl FitSettings {
     }
 
     /// Everything that decides a result.
-    pub fn key(&self) -> Value {
-        json!({ "config": self.config, "factor": self.factor })
+    pub fn key(&self) -> Canonical {
+        Canonical::of(json!({ "config": self.config, "factor": self.factor }))
     }
 
     /// In words, for tables.

@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 pub mod baseline;
+pub mod canonical;
 pub mod codec;
 pub mod figure;
 pub mod fitting;

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use veni_light::digest::Digest;
 
+use crate::canonical::Canonical;
 use crate::{Error, Result};
 use veni_light::output::{Overwrite, below, write_atomic};
 
@@ -30,12 +30,12 @@ pub struct Key {
     /// What people call it: the beginning of the file's name.
     pub name: String,
     /// Everything that decides the value.
-    pub decides: Value,
+    pub decides: Canonical,
 }
 
 #[derive(Serialize, Deserialize)]
 struct Kept<T> {
-    key: Value,
+    key: Canonical,
     value: T,
 }
 
@@ -57,10 +57,8 @@ impl Store {
             Err(e) => return Err(Error::io(&path, "read", e)),
         };
         let damaged = |why: String| {
-            Error::invalid(format!(
-                "{}: no kept result ({why}); remove the file to compute it again",
-                path.display()
-            ))
+            Error::invalid(format!("no kept result ({why}); remove the file to compute it again"))
+                .in_file(&path)
         };
         let kept: Kept<T> = serde_json::from_slice(&bytes).map_err(|e| damaged(e.to_string()))?;
         if kept.key != key.decides {
@@ -79,7 +77,7 @@ impl Store {
         fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         let kept = Kept { key: key.decides.clone(), value };
         let text = serde_json::to_vec(&kept)
-            .map_err(|e| Error::invalid(format!("{}: cannot be written as JSON: {e}", path.display())))?;
+            .map_err(|e| Error::invalid(format!("cannot be written as JSON: {e}")).in_file(&path))?;
         write_atomic(&path, Overwrite::Replace, |file| {
             file.write_all(&text).map_err(|e| Error::io(&path, "write", e))
         })
@@ -100,7 +98,8 @@ mod tests {
     use serde_json::json;
 
     fn key(steps: u64) -> Key {
-        Key { protocol: "fit", name: "a sky/α".to_owned(), decides: json!({ "steps": steps, "rate": 0.1 }) }
+        let decides = Canonical::of(json!({ "steps": steps, "rate": 0.1 }));
+        Key { protocol: "fit", name: "a sky/α".to_owned(), decides }
     }
 
     #[test]

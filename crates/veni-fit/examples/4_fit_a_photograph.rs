@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut best = best_of(&decoder, &target, &random_starts(&prior, 0.0, 4, 1), &config, &mut |_, _| {})?;
     println!("loss from each start: {:.4?}", best.losses);
     // the fit saw the photograph at exposure 0
-    best.latent.log_exposure += seen.log_exposure;
+    best.latent.log_exposure += seen.log_exposure();
 
     let completed = Panorama::new(truth.grid(), decoder.condition(&best.latent)?.bake(truth.grid()));
     let mut options = WriteOptions::new(WriteFormat::Png(Tonemap::reference(&truth)));

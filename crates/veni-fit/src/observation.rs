@@ -13,18 +13,14 @@ const LEAST_KNOWN: f32 = 0.1;
 /// One image, ready to be fitted.
 #[derive(Clone, Debug)]
 pub struct Observation {
-    /// Width and height; the directions too, for a panorama.
-    pub grid: Equirect,
+    grid: Equirect,
     /// Directions and areas of the pixels of a perspective view.
-    pub view: Option<(Vec<[f32; 3]>, Vec<f32>)>,
-    /// Log radiance at exposure 0, 3·W·H values.
-    pub log_radiance: Vec<f32>,
-    /// What was subtracted: the mean of ln(luminance) over what is known, weighted by area.
-    pub log_exposure: f32,
+    view: Option<(Vec<[f32; 3]>, Vec<f32>)>,
+    log_radiance: Vec<f32>,
+    log_exposure: f32,
     /// How much of each pixel is known, if not all of all.
-    pub mask: Option<Vec<f32>>,
-    /// Which values are clipped, if any.
-    pub clipped: Option<Vec<bool>>,
+    mask: Option<Vec<f32>>,
+    clipped: Option<Vec<bool>>,
 }
 
 impl Observation {
@@ -133,6 +129,26 @@ impl Observation {
             mask: known.iter().any(|k| *k < 1.0 - 1e-5).then_some(known),
             clipped: clipped.filter(|c| c.iter().any(|c| *c)),
         })
+    }
+
+    /// Width and height; the directions too, for a panorama.
+    pub fn grid(&self) -> Equirect {
+        self.grid
+    }
+
+    /// Natural-log radiance at exposure 0, 3·W·H values, row-major, channels last.
+    pub fn log_radiance(&self) -> &[f32] {
+        &self.log_radiance
+    }
+
+    /// What was subtracted: the mean of ln(luminance) over what is known, weighted by area.
+    pub fn log_exposure(&self) -> f32 {
+        self.log_exposure
+    }
+
+    /// Which of the 3·W·H values are clipped, if any.
+    pub fn clipped(&self) -> Option<&[bool]> {
+        self.clipped.as_deref()
     }
 
     /// Whether some of the sphere is not seen, so that the scene's own exposure is not known.

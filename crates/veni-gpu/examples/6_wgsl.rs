@@ -19,6 +19,8 @@ use veni_light::model::Model;
 
 /// Workgroup memory that every WebGPU device has, bytes.
 const WORKGROUP_MEMORY: u32 = 16 << 10;
+/// The first line: a copy in a repository says that it is one.
+const GENERATED: &str = "// Generated from crates/veni-gpu/shaders by the example 6_wgsl: do not edit.\n";
 const USAGE: &str = "6_wgsl [--function | --module | --kernel | --light] [--model FILE]";
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -55,7 +57,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             shader::field(sizes)
         }
     };
-    std::io::stdout().write_all(text.as_bytes())?;
+    std::io::stdout().write_all([GENERATED, &text].concat().as_bytes())?;
     Ok(())
 }
 

@@ -15,12 +15,13 @@ pub enum Error {
     Gpu {
         /// What was being made or done.
         what: String,
-        /// The device's own words.
-        cause: String,
+        /// The device's own error, whose words the message has too.
+        #[source]
+        cause: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// From veni-core: a latent that does not fit the model, for instance.
+    /// From veni-light: a latent that does not fit the model, for instance.
     #[error(transparent)]
-    Core(#[from] veni_light::Error),
+    Light(#[from] veni_light::Error),
 }
 
 /// A result with this crate's [`Error`].
@@ -35,7 +36,17 @@ impl Error {
         Self::Unsupported(message.into())
     }
 
-    pub(crate) fn gpu(what: impl Into<String>, cause: impl std::fmt::Display) -> Self {
-        Self::Gpu { what: what.into(), cause: cause.to_string() }
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(crate) fn gpu(
+        what: impl Into<String>,
+        cause: impl std::error::Error + Send + Sync + 'static,
+    ) -> Self {
+        Self::Gpu { what: what.into(), cause: Box::new(cause) }
+    }
+
+    /// A browser's errors belong to one thread: their words are kept.
+    #[cfg(target_arch = "wasm32")]
+    pub(crate) fn gpu(what: impl Into<String>, cause: impl std::error::Error) -> Self {
+        Self::Gpu { what: what.into(), cause: cause.to_string().into() }
     }
 }

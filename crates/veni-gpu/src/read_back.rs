@@ -191,12 +191,12 @@ impl Pending {
 
     fn mapped(self, device: &Device, host: &Buffer, mut use_bytes: impl FnMut(&[u8])) -> Result<()> {
         let Self { mapped, submission, bytes } = self;
-        let failed = |e: &dyn std::fmt::Display| Error::gpu("reading results back", e);
+        const WHAT: &str = "reading results back";
         // this submission only: the next may go on
         let wait = PollType::Wait { submission_index: Some(submission), timeout: None };
-        device.poll(wait).map_err(|e| failed(&e))?;
-        mapped.recv().map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
-        let view = host.slice(..bytes).get_mapped_range().map_err(|e| failed(&e))?;
+        device.poll(wait).map_err(|e| Error::gpu(WHAT, e))?;
+        mapped.recv().map_err(|e| Error::gpu(WHAT, e))?.map_err(|e| Error::gpu(WHAT, e))?;
+        let view = host.slice(..bytes).get_mapped_range().map_err(|e| Error::gpu(WHAT, e))?;
         use_bytes(&view);
         drop(view);
         host.unmap();

@@ -24,6 +24,7 @@
 
 mod budget;
 mod colour;
+mod encoder;
 pub mod engine;
 mod equal_area;
 pub mod exposure;

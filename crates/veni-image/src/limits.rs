@@ -1,7 +1,7 @@
 //! Limits of what is read from image files, each with its reason. They are checked before anything of the size in question
-//! is allocated, and refused as [`Error::TooLarge`] with the value and the limit.
+//! is allocated, and refused as [`Error::TooLarge`](crate::Error::TooLarge) with the value and the limit.
 
-use crate::{Error, Result};
+pub(crate) use veni_light::limits::at_most;
 
 /// Largest number of pixels read unless [`ReadOptions::max_pixels`](crate::ReadOptions) says otherwise: 2²⁸, a little over
 /// 23,000 × 11,500. The largest panoramas on offer have 24,000 × 12,000 only as tiles; 16,384 × 8,192 is half of this.
@@ -63,11 +63,3 @@ pub const EXAMINE_BYTES_PER_PIXEL: u64 = 96;
 
 /// Bytes that reading any file may take besides its pixels: headers, metadata, buffers of decoders.
 pub const BYTES_PER_FILE: u64 = 32 << 20;
-
-/// Refuses `value` beyond `limit`; `what` names it with its unit ("bytes of metadata").
-pub(crate) fn at_most(what: &str, value: u64, limit: u64) -> Result<()> {
-    if value <= limit {
-        return Ok(());
-    }
-    Err(Error::too_large(format!("{value} {what} are more than the limit of {limit}")))
-}

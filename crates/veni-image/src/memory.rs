@@ -14,11 +14,15 @@ pub fn check(bytes: u64) -> Result<()> {
     let left = if bytes > SMALL { available() } else { None };
     match left.filter(|left| bytes > *left) {
         None => Ok(()),
-        Some(left) => Err(Error::too_large(format!(
-            "its pixels need {} MiB of memory, and {} MiB are available: make it smaller",
-            bytes >> 20,
-            left >> 20
-        ))),
+        Some(left) => Err(Error::beyond(
+            format!(
+                "its pixels need {} MiB of memory, and {} MiB are available: make it smaller",
+                bytes >> 20,
+                left >> 20
+            ),
+            bytes,
+            left,
+        )),
     }
 }
 
@@ -77,6 +81,9 @@ mod tests {
         assert!((1 << 20..1 << 50).contains(&found), "{found}");
         check(found / 4).unwrap();
         let error = check(2 * found + (1 << 50)).unwrap_err();
-        assert!(matches!(&error, Error::TooLarge(m) if m.contains("MiB are available")), "{error}");
+        assert!(
+            matches!(&error, Error::TooLarge { message, .. } if message.contains("MiB are available")),
+            "{error}"
+        );
     }
 }

@@ -79,7 +79,12 @@ impl Picture {
             }
         };
         let size = [panorama.grid.width, panorama.grid.height];
-        Ok(Self { size, pixels: panorama.pixels, known: panorama.known, clip, notes: panorama.notes })
+        let crate::Panorama { pixels, known, notes, .. } = panorama;
+        let picture = Self { size, pixels, known, clip: None, notes };
+        Ok(match clip {
+            Some(clip) => picture.clipped_at(clip),
+            None => picture,
+        })
     }
 
     /// Width and height.

@@ -29,16 +29,16 @@ impl Provenance {
     /// What the attributes say of `pixels`, the values as they are stored.
     pub(crate) fn of(attributes: &BTreeMap<String, String>, grid: Equirect, pixels: &[[f32; 3]]) -> Self {
         let Some(recorded) = attributes.get(PIXEL_DIGEST) else { return Self::Unrecorded };
-        let mut digest = Digest::new(grid);
+        let mut digest = PixelDigest::new(grid);
         digest.update(pixels);
         if *recorded == digest.finish() { Self::Same } else { Self::Changed }
     }
 }
 
 /// The digest of pixels that come row by row.
-pub(crate) struct Digest(Hasher);
+pub(crate) struct PixelDigest(Hasher);
 
-impl Digest {
+impl PixelDigest {
     /// As long as every digest, where the right one is not known yet.
     pub(crate) const BLANK: &str = "xxh3:00000000000000000000000000000000";
 
@@ -73,16 +73,16 @@ mod tests {
     #[test]
     fn the_digest_is_what_the_format_says() {
         let pixels = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
-        let mut digest = Digest::new(Equirect::new(2, 1));
+        let mut digest = PixelDigest::new(Equirect::new(2, 1));
         pixels.iter().for_each(|pixel| digest.update(&[*pixel]));
         assert_eq!(digest.finish(), "xxh3:2496ed36f7b74f60572219a125eb8e7f");
-        assert_eq!(digest.finish().len(), Digest::BLANK.len());
+        assert_eq!(digest.finish().len(), PixelDigest::BLANK.len());
     }
 
     #[test]
     fn one_bit_or_another_shape_is_noticed() {
         let pixels = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
-        let mut digest = Digest::new(Equirect::new(2, 1));
+        let mut digest = PixelDigest::new(Equirect::new(2, 1));
         digest.update(&pixels);
         let said = BTreeMap::from([(PIXEL_DIGEST.to_owned(), digest.finish())]);
         let of = |grid, pixels: &[[f32; 3]]| Provenance::of(&said, grid, pixels);

@@ -58,6 +58,7 @@ pub fn sanitise_values(values: &mut [f32]) -> Result<Sanitised> {
 ///
 /// # Panics
 /// If `channels` < 3 or does not divide the number of values.
+#[doc(hidden)]
 pub fn log_reference(values: &[f32], channels: usize) -> Result<Vec<[f32; 3]>> {
     let n = values.len();
     assert!(channels >= 3 && n.is_multiple_of(channels), "{n} values of {channels} channels");

@@ -1,11 +1,11 @@
-//! Contact sheets: several 8-bit pictures of one size, side by side in one PNG. And the one place where 8-bit sRGB pictures
-//! become PNG files.
+//! Contact sheets: several 8-bit pictures of one size, side by side in one PNG; and any 8-bit sRGB picture as a PNG file.
 
 use std::io::Write;
 use std::path::Path;
 
 use veni_light::output::{Overwrite, write_atomic};
 
+use crate::encoder::encoder;
 use crate::{Error, Result};
 
 /// Pixels between pictures.
@@ -62,6 +62,16 @@ impl Sheet {
         }
     }
 
+    /// Width and height of the whole, in pixels.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// All pixels, sRGB, row-major from the top left.
+    pub fn pixels(&self) -> &[[u8; 3]] {
+        &self.pixels
+    }
+
     /// Writes the PNG.
     ///
     /// # Errors
@@ -84,22 +94,15 @@ pub fn write_png(
 ) -> Result<()> {
     let broken = |e: png::EncodingError| match e {
         png::EncodingError::IoError(e) => Error::io(path, "write", e),
-        other => Error::invalid(format!("{}: PNG: {other}", path.display())),
+        other => Error::invalid(format!("PNG: {other}")).in_file(path),
     };
     if pixels.len() != width * height {
         let count = pixels.len();
-        return Err(Error::invalid(format!("{}: {count} pixels for {width} × {height}", path.display())));
+        return Err(Error::invalid(format!("{count} pixels for {width} × {height}")).in_file(path));
     }
-    let side = |n: usize| {
-        u32::try_from(n)
-            .map_err(|_| Error::invalid(format!("{}: {n} is too long a side for PNG", path.display())))
-    };
-    let (width, height) = (side(width)?, side(height)?);
     write_atomic(path, overwrite, |file| {
-        let mut encoder = png::Encoder::new(&mut *file, width, height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let encoder =
+            encoder(&mut *file, [width, height], png::ColorType::Rgb).map_err(|e| e.in_file(path))?;
         let mut writer = encoder.write_header().map_err(broken)?;
         writer.write_image_data(pixels.as_flattened()).map_err(broken)?;
         writer.finish().map_err(broken)?;

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use sha2::{Digest as _, Sha256};
 
 use crate::{Error, Result};
@@ -60,6 +60,12 @@ impl Serialize for Digest {
     }
 }
 
+impl<'de> Deserialize<'de> for Digest {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
 impl FromStr for Digest {
     type Err = Error;
 
@@ -94,9 +100,12 @@ mod tests {
         let small: Digest = "00000000000000ff".parse().unwrap();
         assert_eq!((small.to_string().as_str(), small.number()), ("00000000000000ff", 255));
         assert!(small < Digest::of("abc"));
+        assert_eq!(serde_json::from_str::<Digest>("\"00000000000000ff\"").unwrap(), small);
         for text in ["", "ff", "BA7816BF8F01CFEA", "+a7816bf8f01cfea", "ba7816bf8f01cfeag", "ba7816bf8f01cfé"]
         {
             assert!(text.parse::<Digest>().unwrap_err().to_string().contains("not a digest"), "{text}");
+            let json = serde_json::to_string(text).unwrap();
+            assert!(serde_json::from_str::<Digest>(&json).unwrap_err().to_string().contains("not a digest"));
         }
     }
 }

@@ -3,16 +3,26 @@
 use std::path::{Path, PathBuf};
 
 /// What went wrong. Messages name the file, the offending value and the remedy, in the words of the library: which
-/// option or button a program has for it, the program adds.
+/// option or button a program has for it, the program adds. Files are fields besides, for who looks for them.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The data violates its format or a documented requirement (truncated file, NaN, wrong shape).
-    #[error("{0}")]
-    Invalid(String),
+    #[error("{}{message}", before(path.as_deref()))]
+    Invalid {
+        /// The file concerned, or what stands for one (the name of an embedded model), once it is known.
+        path: Option<PathBuf>,
+        /// What is wrong with it.
+        message: String,
+    },
     /// The data is well formed, but not something this crate reads or does.
-    #[error("{0}")]
-    Unsupported(String),
+    #[error("{}{message}", before(path.as_deref()))]
+    Unsupported {
+        /// As of [`Error::Invalid`].
+        path: Option<PathBuf>,
+        /// What is not read or done.
+        message: String,
+    },
     /// An image whose format holds a display's range, where radiance is needed.
     #[error("{}: {format} holds no high dynamic range; expand such panoramas into EXR files first", path.display())]
     LowRange {
@@ -46,8 +56,17 @@ pub enum Error {
         owner: Option<String>,
     },
     /// The data is, or claims to be, larger than a limit that protects the memory.
-    #[error("{0}")]
-    TooLarge(String),
+    #[error("{}{message}", before(path.as_deref()))]
+    TooLarge {
+        /// As of [`Error::Invalid`].
+        path: Option<PathBuf>,
+        /// What is larger than what, with the unit of both.
+        message: String,
+        /// What was found, where it was counted to its end.
+        value: Option<u64>,
+        /// The most that is taken, where it is one number.
+        limit: Option<u64>,
+    },
     /// The caller asked to stop.
     #[error("cancelled")]
     Cancelled,
@@ -69,17 +88,22 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 impl Error {
     /// An [`Error::Invalid`] from anything printable.
     pub fn invalid(message: impl Into<String>) -> Self {
-        Self::Invalid(message.into())
+        Self::Invalid { path: None, message: message.into() }
     }
 
     /// An [`Error::Unsupported`] from anything printable.
     pub fn unsupported(message: impl Into<String>) -> Self {
-        Self::Unsupported(message.into())
+        Self::Unsupported { path: None, message: message.into() }
     }
 
-    /// An [`Error::TooLarge`] from anything printable.
+    /// An [`Error::TooLarge`] from anything printable, where no two numbers were compared.
     pub fn too_large(message: impl Into<String>) -> Self {
-        Self::TooLarge(message.into())
+        Self::TooLarge { path: None, message: message.into(), value: None, limit: None }
+    }
+
+    /// An [`Error::TooLarge`] of a `value` beyond the `limit`, both of which the message should say.
+    pub fn beyond(message: impl Into<String>, value: u64, limit: u64) -> Self {
+        Self::TooLarge { path: None, message: message.into(), value: Some(value), limit: Some(limit) }
     }
 
     /// An [`Error::Layers`] of a file that [`Error::in_file`] will name.
@@ -97,20 +121,27 @@ impl Error {
         Self::Io { path: path.as_ref().to_path_buf(), action, source }
     }
 
-    /// The same error with `path: ` put before its message, unless the message begins with that already or the error
-    /// has a path of its own.
+    /// The same error of the file `path`, which is then said before its message. An error of [`Error::Invalid`],
+    /// [`Error::Unsupported`] or [`Error::TooLarge`] that names another file keeps that one in its message (a panorama, and
+    /// the model that does not encode it); the other kinds keep the path that they have.
     #[must_use]
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
-        let prefix = format!("{}: ", path.as_ref().display());
-        let named = |message: String| {
-            if message.starts_with(&prefix) { message } else { format!("{prefix}{message}") }
+        let path = path.as_ref();
+        let place = |known: Option<PathBuf>, message: String| match known {
+            Some(known) if known != path => format!("{}: {message}", known.display()),
+            _ => message,
         };
+        let named = Some(path.to_path_buf());
         match self {
-            Self::Invalid(message) => Self::Invalid(named(message)),
-            Self::Unsupported(message) => Self::Unsupported(named(message)),
-            Self::TooLarge(message) => Self::TooLarge(named(message)),
+            Self::Invalid { path, message } => Self::Invalid { message: place(path, message), path: named },
+            Self::Unsupported { path, message } => {
+                Self::Unsupported { message: place(path, message), path: named }
+            }
+            Self::TooLarge { path, message, value, limit } => {
+                Self::TooLarge { message: place(path, message), path: named, value, limit }
+            }
             Self::Layers { path: known, wanted, layers } if known.as_os_str().is_empty() => {
-                Self::Layers { path: path.as_ref().to_path_buf(), wanted, layers }
+                Self::Layers { path: path.to_path_buf(), wanted, layers }
             }
             other @ (Self::Layers { .. }
             | Self::LowRange { .. }
@@ -128,6 +159,11 @@ impl Error {
             _ => self.to_string(),
         }
     }
+}
+
+/// A path as it stands before a message.
+fn before(path: Option<&Path>) -> String {
+    path.map(|path| format!("{}: ", path.display())).unwrap_or_default()
 }
 
 fn layers_message(wanted: Option<&str>, layers: &[String]) -> String {
@@ -150,6 +186,17 @@ mod tests {
             assert_eq!(error.in_file("a.exr").in_file("a.exr").to_string(), "a.exr: is wrong");
         }
         assert_eq!(Error::exists("a.exr").in_file("b.exr").to_string(), "a.exr: exists already");
+        let both = Error::invalid(wrong).in_file("a.safetensors").in_file("b.exr");
+        assert_eq!(both.to_string(), "b.exr: a.safetensors: is wrong");
+        assert!(matches!(both, Error::Invalid { path: Some(path), .. } if path == Path::new("b.exr")));
+    }
+
+    #[test]
+    fn what_is_too_large_says_by_how_much() {
+        let error = crate::limits::at_most("lobes", 3, 2).unwrap_err().in_file("a.json");
+        assert_eq!(error.to_string(), "a.json: 3 lobes are more than the limit of 2");
+        let Error::TooLarge { path, value, limit, .. } = error else { panic!("{error:?}") };
+        assert_eq!((path.as_deref(), value, limit), (Some(Path::new("a.json")), Some(3), Some(2)));
     }
 
     #[test]

@@ -50,7 +50,7 @@ pub fn at_most(what: &str, value: u64, limit: u64) -> Result<()> {
     if value <= limit {
         return Ok(());
     }
-    Err(Error::too_large(format!("{value} {what} are more than the limit of {limit}")))
+    Err(Error::beyond(format!("{value} {what} are more than the limit of {limit}"), value, limit))
 }
 
 /// All bytes of a file, of which `what` says what it is ("a latent"). A pipe and a file that grows are read up to the limit.
@@ -61,13 +61,19 @@ pub fn read_file(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>> {
     let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
     let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
     let most = if limit >= 1 << 20 { format!("{} MiB", limit >> 20) } else { format!("{limit} bytes") };
-    let refuse = || Error::too_large(format!("not {what} (larger than {most})")).in_file(path);
+    // a device or a pipe that goes on beyond the limit says no size
+    let refuse = |value| Error::TooLarge {
+        path: Some(path.to_path_buf()),
+        message: format!("not {what} (larger than {most})"),
+        value,
+        limit: Some(limit),
+    };
     if size > limit {
-        return Err(refuse());
+        return Err(refuse(Some(size)));
     }
-    let mut bytes = Vec::with_capacity(usize::try_from(size).map_err(|_| refuse())?);
+    let mut bytes = Vec::with_capacity(usize::try_from(size).map_err(|_| refuse(Some(size)))?);
     file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
-    if bytes.len() as u64 > limit { Err(refuse()) } else { Ok(bytes) }
+    if bytes.len() as u64 > limit { Err(refuse(None)) } else { Ok(bytes) }
 }
 
 /// [`read_file`] as text ([`text::decode`](crate::text::decode)).
@@ -91,7 +97,8 @@ mod tests {
         assert_eq!(read_text(&path, "a note", 5).unwrap(), "12345");
         let error = read_text(&path, "a note", 4).unwrap_err();
         assert!(
-            matches!(&error, Error::TooLarge(m) if m.contains("a.txt: not a note (larger than 4")),
+            matches!(&error, Error::TooLarge { value: Some(5), limit: Some(4), .. })
+                && error.to_string().contains("a.txt: not a note (larger than 4"),
             "{error}"
         );
         std::fs::write(&path, [0xFF]).unwrap();
@@ -99,6 +106,9 @@ mod tests {
         assert!(matches!(read_file(&folder.path().join("none"), "a note", 5), Err(Error::Io { .. })));
         // a device says that it has no bytes, and has no end
         #[cfg(target_os = "linux")]
-        assert!(matches!(read_file(Path::new("/dev/zero"), "a note", 1000), Err(Error::TooLarge(_))));
+        assert!(matches!(
+            read_file(Path::new("/dev/zero"), "a note", 1000),
+            Err(Error::TooLarge { value: None, .. })
+        ));
     }
 }

@@ -38,9 +38,8 @@ pub fn write_atomic(
     write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
 ) -> Result<()> {
     refuse_existing(path, overwrite)?;
-    let name = path
-        .file_name()
-        .ok_or_else(|| Error::invalid(format!("{}: is not a file name to write to", path.display())))?;
+    let name =
+        path.file_name().ok_or_else(|| Error::invalid("is not a file name to write to").in_file(path))?;
     let (part, file) = Part::create(path, name).map_err(|e| Error::io(path, "create", e))?;
     let mut file = BufWriter::new(file);
     let failed = |e| Error::io(path, "write", e);
@@ -70,7 +69,7 @@ pub fn refuse_existing(path: &Path, overwrite: Overwrite) -> Result<()> {
         (Ok(_), Overwrite::Refuse) => Err(Error::exists(path)),
         (Ok(meta), Overwrite::Replace) if !meta.is_file() && !meta.is_symlink() => {
             let what = if meta.is_dir() { "a folder" } else { "a device or a pipe" };
-            Err(Error::invalid(format!("{}: is {what}, which no file replaces; name a file", path.display())))
+            Err(Error::invalid(format!("is {what}, which no file replaces; name a file")).in_file(path))
         }
         _ => Ok(()),
     }

@@ -24,6 +24,13 @@ fn hashes_of_the_shipped_models() {
     assert_eq!(hashes, pinned);
 }
 
+/// In a build with all of them, which .ci/run sees to: none of the three is left out above.
+#[cfg(feature = "pretrained-large")]
+#[test]
+fn all_three_models_are_inside() {
+    assert!(Model::pretrained_sizes().eq(HASHES.map(|(n, _)| n)));
+}
+
 /// Whether the kernels multiply and add without rounding in between: every lane then has the same bits whatever the
 /// width of a vector, and the digest below holds. Elsewhere each multiply-add rounds twice, and the bits are others.
 fn fused() -> bool {

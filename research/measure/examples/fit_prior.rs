@@ -22,7 +22,7 @@ use veni_core::progress::Silent;
 use veni_core::sphere::Equirect;
 use veni_core::vae::Veni;
 use veni_core::{Error, Result};
-use veni_eval::figure::{Sheet, display};
+use veni_eval::figure::{LabelledSheet, display};
 
 const FULL: Equirect = Equirect { width: 128, height: 64 };
 const STEPS: usize = 8;
@@ -50,7 +50,7 @@ fn main() -> Result<()> {
     let rows: Vec<_> = weights.iter().map(|weight| format!("{weight}")).collect();
     let columns: Vec<_> =
         names.windows(2).flat_map(|n| [n[0].clone(), "middle".into(), n[1].clone()]).collect();
-    let mut drawn = Sheet::new(grid, &columns, &rows);
+    let mut drawn = LabelledSheet::new(grid, &columns, &rows);
     println!(
         "| weight | log RMSE | LDR PSNR | largest step / mean | length / direct | −ln p of latents | of midpoints |"
     );

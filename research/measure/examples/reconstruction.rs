@@ -8,13 +8,12 @@
 use std::path::Path;
 
 use burn::tensor::Device;
-use image::{Rgb, RgbImage};
 use veni_core::LoadedModel;
 use veni_core::data::Reconstruction;
 use veni_core::data::{Dataset, Item, panorama_files};
 use veni_core::latent::Latent;
 use veni_core::model::Model;
-use veni_core::output::{Overwrite, write_atomic};
+use veni_core::output::Overwrite;
 use veni_core::panorama::Panorama;
 use veni_core::panorama::metrics::Alignment;
 use veni_core::panorama::tonemap::Tonemap;
@@ -24,6 +23,7 @@ use veni_core::vae::Veni;
 use veni_core::{Error, Result};
 use veni_eval::codec::{Autoencoder, Codec, Optimised};
 use veni_eval::fitting::FitSettings;
+use veni_image::Sheet;
 
 fn main() -> Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
@@ -86,28 +86,21 @@ fn reference_protocol(veni: &Veni, set: &Dataset) -> Result<Reconstruction> {
 
 /// Target | reconstruction | random sky, a row per panorama.
 fn draw(path: &Path, model: &Model, veni: &Veni, set: &Dataset) -> Result<()> {
-    const GAP: u32 = 4;
     let grid = Equirect::new(256, 128);
-    let (w, h) = (grid.width as u32, grid.height as u32);
-    let mut sheet = RgbImage::from_pixel(3 * w + 2 * GAP, set.len() as u32 * (h + GAP) - GAP, Rgb([255; 3]));
+    let mut sheet = Sheet::spaced(3, set.len(), [grid.width, grid.height], 4, [255; 3]);
     let (decoder, prior) = (model.decoder()?, model.prior());
     let images: Vec<_> = set.items().iter().map(|item| item.log_radiance.as_slice()).collect();
     let latents = veni.encode(set.grid(), &images)?.into_iter().map(|e| Latent::new(e.vectors));
-    for (r, (item, latent)) in (0..).zip(set.items().iter().zip(latents)) {
+    for (row, (item, latent)) in set.items().iter().zip(latents).enumerate() {
         let mut target = Panorama::read(&item.path)?;
         target.sanitise()?;
-        let random = Latent::from_seed(&prior, u64::from(r));
+        let random = Latent::from_seed(&prior, row as u64);
         let [reconstruction, random] = [latent, random]
             .map(|z| decoder.condition(&z).map(|field| Panorama::new(grid, field.bake(grid))));
-        for (c, panorama) in (0..).zip([target.resample(grid), reconstruction?, random?]) {
+        for (column, panorama) in [target.resample(grid), reconstruction?, random?].into_iter().enumerate() {
             let tonemap = Tonemap::reference(&panorama);
-            for (p, pixel) in (0..).zip(panorama.pixels()) {
-                sheet.put_pixel(c * (w + GAP) + p % w, r * (h + GAP) + p / w, Rgb(tonemap.apply_u8(*pixel)));
-            }
+            sheet.place(column, row, panorama.pixels().iter().map(|pixel| tonemap.apply_u8(*pixel)));
         }
     }
-    write_atomic(path, Overwrite::Replace, |out| {
-        let written = sheet.write_to(out, image::ImageFormat::Png);
-        written.map_err(|e| Error::invalid(format!("{}: {e}", path.display())))
-    })
+    sheet.write(path, Overwrite::Replace)
 }

@@ -11,6 +11,8 @@ use std::time::Instant;
 use veni_core::panorama::tonemap::Tonemap;
 use veni_core::panorama::{HalfRange, Panorama, Precision, WriteFormat, WriteOptions};
 use veni_core::sphere::Equirect;
+use veni_image::Sheet;
+use veni_light::output::Overwrite;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -44,15 +46,10 @@ fn main() -> Result<(), Failure> {
 fn sheet(pictures: &[Panorama], grid: Equirect, path: &Path) -> Result<(), Failure> {
     let columns = pictures.len().clamp(1, 4);
     let rows = pictures.len().div_ceil(columns).max(1);
-    let side = |n: usize| u32::try_from(n);
-    let mut out = image::RgbImage::new(side(columns * grid.width)?, side(rows * grid.height)?);
+    let mut out = Sheet::spaced(columns, rows, [grid.width, grid.height], 0, [0; 3]);
     for (k, picture) in pictures.iter().enumerate() {
         let map = Tonemap::filmic(picture, 0.0);
-        for (n, &pixel) in picture.pixels().iter().enumerate() {
-            let x = k % columns * grid.width + n % grid.width;
-            let y = k / columns * grid.height + n / grid.width;
-            out.put_pixel(side(x)?, side(y)?, image::Rgb(map.apply_u8(pixel)));
-        }
+        out.place(k % columns, k / columns, picture.pixels().iter().map(|pixel| map.apply_u8(*pixel)));
     }
-    Ok(out.save(path)?)
+    Ok(out.write(path, Overwrite::Replace)?)
 }

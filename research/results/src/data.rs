@@ -22,7 +22,7 @@ pub(crate) enum Cell {
 #[serde(deny_unknown_fields)]
 pub(crate) struct Entry {
     pub(crate) title: String,
-    /// The command that printed it, as it was typed; absent where the notes name several.
+    /// The commands that make it, a line each; absent where none was recorded.
     pub(crate) command: Option<String>,
     /// The commit that was measured or, where that is not known, the one that recorded the numbers.
     pub(crate) commit: Option<String>,

@@ -12,11 +12,25 @@ const HEAD: usize = 12;
 
 /// What is wrong, a line each.
 pub(crate) fn broken(root: &Path) -> Result<Vec<String>> {
-    let mut files: Vec<PathBuf> =
-        ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(PathBuf::from).to_vec();
-    for folder in ["docs", "docs/results"] {
-        let names = data::names(&root.join(folder), "md")?;
-        files.extend(names.iter().map(|name| Path::new(folder).join(format!("{name}.md"))));
+    let mut folders: Vec<PathBuf> = [
+        "",
+        "docs",
+        "docs/results",
+        "examples",
+        "examples/bevy",
+        "assets",
+        "assets/panoramas",
+        "scripts/engines",
+    ]
+    .map(PathBuf::from)
+    .to_vec();
+    for entry in std::fs::read_dir(root.join("crates")).map_err(|e| format!("crates: {e}"))? {
+        folders.push(Path::new("crates").join(entry.map_err(|e| format!("crates: {e}"))?.file_name()));
+    }
+    let mut files = Vec::new();
+    for folder in folders {
+        let names = data::names(&root.join(&folder), "md")?;
+        files.extend(names.iter().map(|name| folder.join(format!("{name}.md"))));
     }
     let read = |path: &Path| {
         std::fs::read_to_string(root.join(path)).map_err(|e| format!("{}: {e}", path.display()))

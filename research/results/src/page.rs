@@ -54,9 +54,10 @@ fn entry(entry: &Entry) -> String {
     if !source.is_empty() {
         parts.push(source);
     }
-    if let Some(command) = &entry.command {
-        parts.push(format!("```sh\n{command}\n```"));
-    }
+    parts.push(match &entry.command {
+        Some(command) => format!("```sh\n{command}\n```"),
+        None => "*Command not recorded.*".to_owned(),
+    });
     parts.extend(entry.before.iter().map(|p| wrap(p)));
     if !entry.header.is_empty() {
         let line = |cells: Vec<String>| format!("| {} |", cells.join(" | "));

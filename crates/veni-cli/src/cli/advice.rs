@@ -9,11 +9,12 @@ use super::Cli;
 use crate::features::{GPU, LEARN};
 
 /// Options of cargo and other programs, which documents and messages name too.
-const FOREIGN: [&str; 27] = [
+const FOREIGN: [&str; 32] = [
     "array",
     "bench",
     "cases",
     "check",
+    "command",
     "compare",
     "cpus-per-task",
     "details",
@@ -21,6 +22,9 @@ const FOREIGN: [&str; 27] = [
     "example",
     "export",
     "features",
+    "include",
+    "lib",
+    "light",
     "mixed",
     "no-default-features",
     "nocapture",
@@ -36,6 +40,7 @@ const FOREIGN: [&str; 27] = [
     "test",
     "threads",
     "time",
+    "topic",
     "veni",
 ];
 /// What follows the program's name in a sentence.
@@ -166,16 +171,29 @@ fn libraries_leave_options_and_commands_to_the_command_line() {
     }
 }
 
+/// Every page that a user or a contributor reads.
+#[cfg(all(feature = "learn", feature = "gpu"))]
+fn documents() -> Vec<PathBuf> {
+    let files =
+        |folder: &Path| std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect::<Vec<_>>();
+    let root = workspace();
+    let mut folders = files(&root.join("crates"));
+    for folder in ["", "docs", "docs/results", "examples", "examples/bevy", "assets", "assets/panoramas"] {
+        folders.push(root.join(folder));
+    }
+    let mut found: Vec<_> = folders.iter().flat_map(|folder| files(folder)).collect();
+    found.retain(|path| path.extension().is_some_and(|e| e == "md"));
+    assert!(found.len() > 30, "only {} documents were found", found.len());
+    found
+}
+
 /// Messages and documents speak of the whole program.
 #[cfg(all(feature = "learn", feature = "gpu"))]
 #[test]
 fn messages_and_documents_name_what_there_is() {
     let known = Known::new();
     let mut texts = texts("veni-cli");
-    let documents = std::fs::read_dir(workspace().join("docs")).unwrap().map(|entry| entry.unwrap().path());
-    for path in
-        documents.chain([workspace().join("README.md")]).filter(|p| p.extension().is_some_and(|e| e == "md"))
-    {
+    for path in documents() {
         // anchors are made of titles, which may begin with an option
         let text = std::fs::read_to_string(&path).unwrap().replace("](#-", "](# ");
         texts.push((path.display().to_string(), text));

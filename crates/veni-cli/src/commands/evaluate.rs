@@ -8,11 +8,11 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use veni_core::train::config::DeviceKind;
-use veni_data::{Dataset, Fold};
+use veni_data::{Dataset, Fold, Part};
 use veni_eval::codec::Codec;
 use veni_eval::lpips::{self, Lpips};
 use veni_eval::protocol::{
-    Evaluation, Published, Report as Findings, Settings, Share, ablations, consistency, dataset_size,
+    Evaluation, Published, Report as Findings, Settings, ablations, consistency, dataset_size,
     equivariance, interpolation, inverse_rendering, light, paper, realism, reconstruction, spheres,
     uniqueness,
 };
@@ -196,8 +196,7 @@ impl Evaluate {
         inputs::check_folder(&self.out)?;
         let device = DeviceKind::Flex;
         let subjects = inputs::subjects(&self.models, device)?;
-        let lpips =
-            if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
+        let lpips = if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, device)?) };
         let data = Dataset::load_observed(&files, grid, &self.layer.options(), &bars);
         bars.end();
         let data = data.map_err(with_remedy)?;
@@ -218,8 +217,7 @@ impl Evaluate {
             observer: &bars,
         };
         if self.shard.is_part() {
-            let (at, of) = self.shard.place();
-            let kept = self.protocol.keep(&evaluation, Share { at, of }).map_err(with_remedy);
+            let kept = self.protocol.keep(&evaluation, self.shard.part()).map_err(with_remedy);
             bars.end();
             kept?;
             let (out, shard) = (self.out.display(), self.shard);
@@ -297,19 +295,19 @@ impl Protocol {
     }
 
     /// A share of what takes long.
-    fn keep(self, evaluation: &Evaluation<'_>, share: Share) -> veni_light::Result<()> {
+    fn keep(self, evaluation: &Evaluation<'_>, part: Part) -> veni_light::Result<()> {
         match self {
-            Self::Reconstruction => reconstruction::keep(evaluation, share),
-            Self::Uniqueness => uniqueness::keep(evaluation, share),
-            Self::Consistency => consistency::keep(evaluation, share),
-            Self::Interpolation => interpolation::keep(evaluation, share),
+            Self::Reconstruction => reconstruction::keep(evaluation, part),
+            Self::Uniqueness => uniqueness::keep(evaluation, part),
+            Self::Consistency => consistency::keep(evaluation, part),
+            Self::Interpolation => interpolation::keep(evaluation, part),
             Self::Equivariance | Self::Realism => Ok(()),
-            Self::DatasetSize => dataset_size::keep(evaluation, share),
-            Self::Ablations => ablations::keep(evaluation, share),
-            Self::Light => light::keep(evaluation, share),
-            Self::Spheres => spheres::keep(evaluation, share),
-            Self::InverseRendering => inverse_rendering::keep(evaluation, share),
-            Self::Paper => paper::keep(evaluation, share),
+            Self::DatasetSize => dataset_size::keep(evaluation, part),
+            Self::Ablations => ablations::keep(evaluation, part),
+            Self::Light => light::keep(evaluation, part),
+            Self::Spheres => spheres::keep(evaluation, part),
+            Self::InverseRendering => inverse_rendering::keep(evaluation, part),
+            Self::Paper => paper::keep(evaluation, part),
         }
     }
 }

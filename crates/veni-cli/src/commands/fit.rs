@@ -184,7 +184,7 @@ impl Fit {
                 let lit = Lit::new(&picture, most).map_err(|e| e.in_file(path))?;
                 let rest = lit.rest.as_ref().unwrap_or(&picture);
                 let observation = self.input.observe(rest, grid).map_err(|e| e.in_file(path))?;
-                let (mask, view) = (observation.mask.clone(), self.input.view());
+                let (mask, view) = (observation.mask().map(<[f32]>::to_vec), self.input.view());
                 let mut fitted = self.fit(path, observation, model, config, report)?;
                 lit.put_into(&mut fitted.best);
                 if lit.rest.is_none() {
@@ -282,13 +282,13 @@ impl Fit {
         });
         bars.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
-        let scores = match (partial, observation.clipped.is_some()) {
+        let scores = match (partial, observation.clipped().is_some()) {
             (false, false) => Some(model.score(&best.latent, &observation)?),
             _ => None,
         };
         // from the image's exposure 0 to its own
         for latent in best.all.iter_mut().chain([&mut best.latent]) {
-            latent.log_exposure += observation.log_exposure;
+            latent.log_exposure += observation.log_exposure();
         }
         let known = Some(observation.share());
         Ok(Fitted { best, known, scores, seconds: started.elapsed().as_secs_f64() })
@@ -362,7 +362,7 @@ impl Fit {
             Start::Encoder if !has_encoder => {
                 bail!("{}: this model has no encoder: use --start zero or noise", model.name())
             }
-            Start::Encoder => model.encode(observation.grid, &observation.log_radiance)?,
+            Start::Encoder => model.encode(observation.grid(), observation.log_radiance())?,
         };
         let rest = count - usize::from(first.is_some());
         let random = random_starts(&model.prior(), 0.0, rest, self.settings.seed());

@@ -87,12 +87,14 @@ impl Train {
     /// Adds to an error what the options of this command can do about it.
     fn with_options(&self, error: Error) -> anyhow::Error {
         match error {
-            Error::Unsupported(_) if self.device == Some(TrainDevice::Wgpu) && self.devices.is_some() => {
+            Error::Unsupported { .. } if self.device == Some(TrainDevice::Wgpu) && self.devices.is_some() => {
                 anyhow!("{error}; 'veni-cli inspect --devices' lists the adapters")
             }
             // what the model differs in: the settings by the options that change them
-            Error::Invalid(text) if self.init.is_some() => anyhow!(
-                text.replace(": set model.latent_vectors=", ": --latent-vectors ")
+            Error::Invalid { .. } if self.init.is_some() => anyhow!(
+                error
+                    .to_string()
+                    .replace(": set model.latent_vectors=", ": --latent-vectors ")
                     .replace(": set model.", ": --set model.")
             ),
             error => with_remedy(error),

@@ -123,11 +123,11 @@ impl Conditioned {
         let picture = picture(directions);
         let mut lit = Lit::new(&self.lights, directions);
         let rows = read_back::bake_rows(decoder, &opened.queue, &self.latents, picture, |at, row| {
-            each(lit.row(at, row)).map_err(veni_gpu::Error::Core)
+            each(lit.row(at, row)).map_err(veni_gpu::Error::Light)
         });
         rows.map_err(|error| match error {
             // what `each` said is not a fault of the device
-            veni_gpu::Error::Core(error) => error,
+            veni_gpu::Error::Light(error) => error,
             error => veni_light::Error::unsupported(format!("{name}: {error}; try --device cpu")),
         })
     }

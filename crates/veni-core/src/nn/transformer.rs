@@ -108,21 +108,17 @@ impl VectorTransformer {
         self.run(x, false, None)
     }
 
-    /// The first token of [`forward`](Self::forward); the last block computes no other.
-    ///
-    /// # Shapes
-    /// - `x`: `[batch, token, coordinate, channel]`
-    /// - output: `[batch, 1, coordinate, channel]`
-    pub fn forward_first(&self, x: Tensor<4>) -> Tensor<4> {
-        self.run(x, true, None)
-    }
-
     /// The products of weights of all blocks; valid until a weight changes.
     pub fn fold(&self) -> FoldedGates {
         FoldedGates(self.layers.iter().map(|block| block.feed_forward.fold()).collect())
     }
 
-    /// [`forward`](Self::forward) or [`forward_first`](Self::forward_first), with folded products if given.
+    /// [`forward`](Self::forward), with folded products if given. With `first_only` only its first token, and the last block
+    /// computes no other.
+    ///
+    /// # Shapes
+    /// - `x`: `[batch, token, coordinate, channel]`
+    /// - output: the same, or `[batch, 1, coordinate, channel]`
     pub fn run(&self, mut x: Tensor<4>, first_only: bool, folded: Option<&FoldedGates>) -> Tensor<4> {
         for (index, block) in self.layers.iter().enumerate() {
             let last = index + 1 == self.layers.len();
@@ -165,7 +161,7 @@ mod tests {
             let transformer = config(layer).init(&mut rng(2), &device);
             let all = transformer.forward(x.clone());
             let first = all.clone().narrow(1, 0, 1);
-            assert!(max_difference(transformer.forward_first(x.clone()), first.clone()) < 1e-5);
+            assert!(max_difference(transformer.run(x.clone(), true, None), first.clone()) < 1e-5);
             let folded = transformer.fold();
             assert!(max_difference(transformer.run(x.clone(), true, Some(&folded)), first) < 1e-5);
             assert!(
@@ -173,7 +169,7 @@ mod tests {
             );
         }
         let none = VectorTransformerConfig { depth: 0, ..config(VectorLayer::Vn) }.init(&mut rng(2), &device);
-        assert_eq!(none.forward_first(x).dims(), [2, 1, 3, 4]);
+        assert_eq!(none.run(x, true, None).dims(), [2, 1, 3, 4]);
     }
 
     #[test]
@@ -181,11 +177,8 @@ mod tests {
         let device = Device::flex().autodiff();
         for layer in [VectorLayer::Vn, VectorLayer::So2] {
             let transformer = config(layer).init(&mut rng(3), &device);
-            assert_gradients(
-                transformer,
-                features([1, 3, 3, 4], 4, &device),
-                VectorTransformer::forward_first,
-            );
+            let first = |transformer: &VectorTransformer, x| transformer.run(x, true, None);
+            assert_gradients(transformer, features([1, 3, 3, 4], 4, &device), first);
         }
     }
 }

@@ -132,6 +132,6 @@ mod tests {
         let message = load(&path).unwrap_err().to_string();
         assert!(message.contains("state.safetensors") && message.contains("damaged"), "{message}");
         save(&path, &state, &CheckpointInfo { format: 9, ..info }).unwrap();
-        assert!(matches!(load(&path).unwrap_err(), Error::Unsupported(_)));
+        assert!(matches!(load(&path).unwrap_err(), Error::Unsupported { .. }));
     }
 }

@@ -43,10 +43,10 @@ impl InitConfig {
         let found = model.digest().to_string();
         match &self.digest {
             Some(wanted) if *wanted != found => Err(Error::invalid(format!(
-                "{}: holds other weights (init.digest {found}) than the configuration was written for ({wanted}): name the \
-                 right file, or remove init.digest to take this one",
-                self.model.display()
-            ))),
+                "holds other weights (init.digest {found}) than the configuration was written for ({wanted}): name the \
+                 right file, or remove init.digest to take this one"
+            ))
+            .in_file(&self.model)),
             _ => {
                 self.digest = Some(found);
                 Ok(model)

@@ -61,7 +61,7 @@ pub fn save(path: &Path, table: &LatentTable, train: &Dataset, model: &str) -> R
     let tensors = crate::vae::weights::read(table, "");
     let bytes: Vec<Vec<u8>> =
         tensors.values().map(|t| t.data.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
-    let broken = |e: &dyn std::fmt::Display| Error::invalid(format!("{}: {e}", path.display()));
+    let broken = |e: &dyn std::fmt::Display| Error::invalid(e.to_string()).in_file(path);
     let mut views = Vec::with_capacity(bytes.len());
     for ((name, tensor), bytes) in tensors.iter().zip(&bytes) {
         let view = TensorView::new(Dtype::F32, tensor.shape.clone(), bytes).map_err(|e| broken(&e))?;

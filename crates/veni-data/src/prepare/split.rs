@@ -129,6 +129,24 @@ mod tests {
         assert_ne!(sides, assign(&all, &none, SHARES, 8));
     }
 
+    /// Prepared folders keep their sides when panoramas are added by a later version. The expected numbers are Python's:
+    /// `(int.from_bytes(sha256(pack("<Q", seed) + key).digest()[:8], "big") >> 11) / 2**53`.
+    #[test]
+    fn a_side_is_what_it_was() {
+        for (seed, key, u, side) in [
+            (0, "kloofendal_43d_clear", 0.201_732_122_835_409_98, Split::Val),
+            (7, "capture_0", 0.443_066_620_945_906_3, Split::Train),
+            (2026, "monday/img_07", 0.787_812_345_953_053_3, Split::Train),
+            (5, "snowy_field", 0.061_773_230_074_404_27, Split::Test),
+        ] {
+            assert_eq!(draw(seed, key), u, "{seed} {key}");
+            // one alone would be moved if its side were empty otherwise: two that are given fill them
+            let keys = [key, "held out", "reported on"].map(str::to_owned);
+            let sides = assign(&keys, &[None, Some(Split::Val), Some(Split::Test)], SHARES, seed);
+            assert_eq!(sides[0], side, "{seed} {key}");
+        }
+    }
+
     #[test]
     fn given_sides_win_and_the_strictest_holds_for_a_group() {
         let keys: Vec<String> = ["a", "a", "a", "b", "c"].map(String::from).into();

@@ -90,6 +90,75 @@ fn captures_and_copies_are_joined_through_each_other() {
     assert_eq!(groups.bonds.iter().map(|b| (b.first, b.second)).collect::<Vec<_>>(), [(0, 2)]);
 }
 
+/// The first and the last of five have nothing in common but what lies between them: look, name, look, name.
+#[test]
+fn a_group_reaches_through_several_links_and_leaves_the_others_out() {
+    let originals = panoramas();
+    let [a, b, c, d] = [0, 1, 2, 3].map(|k| &originals[k]);
+    let prints: Vec<_> = [a, &a.mirror(), b, &b.turn(2.0), c, d].map(Fingerprint::new).into();
+    let captures = ["e", "d", "d", "c", "c", "z"];
+    let members: Vec<_> = (captures.into_iter().zip(&prints))
+        .map(|(capture, fingerprint)| Member { capture, fingerprint })
+        .collect();
+    let groups = group(&members);
+    assert_eq!(groups.keys, ["c", "c", "c", "c", "c", "z"]);
+    assert_eq!(groups.bonds.iter().map(|b| (b.first, b.second)).collect::<Vec<_>>(), [(0, 1), (2, 3)]);
+    // without the middle the two ends are strangers
+    let apart = group(&[members[0], members[1], members[3], members[4]]);
+    assert_eq!(apart.keys, ["d", "d", "c", "c"]);
+}
+
+/// A picture of a display's range: what is clipped is counted by solid angle, the sun is added where it is, and the facts are
+/// those of the expansion.
+#[test]
+fn an_expanded_file_says_what_was_clipped_and_where_its_sun_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sky.png");
+    let grid = Equirect::new(64, 32);
+    // two rows of four columns at an elevation of about 40°, around the middle column but one
+    let white = |column: usize, row: usize| (8..10).contains(&row) && (38..42).contains(&column);
+    let pixels: Vec<[u8; 3]> = (0..grid.len())
+        .map(|k| (k % 64, k / 64))
+        .map(|(column, row)| if white(column, row) { [255; 3] } else { [60 + row as u8, 80, 120] })
+        .collect();
+    veni_image::write_png(&path, [64, 32], &pixels, veni_light::output::Overwrite::Refuse).unwrap();
+    let config = PrepareConfig {
+        grid: Equirect::new(32, 16),
+        expand: Some(Expander::Fitted(ExpandOptions::default())),
+        read: ReadOptions::default(),
+    };
+    let found = examine(&path, &config).unwrap();
+    let expansion = found.expanded.unwrap();
+    let angle = 4.0 * (grid.solid_angle(8) + grid.solid_angle(9));
+    assert!((expansion.clipped - angle / (4.0 * std::f64::consts::PI)).abs() < 1e-12, "{expansion:?}");
+    let sun = expansion.sun.unwrap().direction;
+    let middle = grid.direction(40, 9);
+    let cosine: f32 = sun.iter().zip(middle).map(|(a, b)| a * b).sum();
+    assert!(cosine > 8f32.to_radians().cos(), "{sun:?} is not near {middle:?}");
+    assert!(expansion.estimate.is_none() && found.replaced.total() == 0);
+    assert_eq!((found.size, found.panorama.grid()), (grid, config.grid));
+    // brighter than white, which is what a display shows of it
+    assert!(found.panorama.pixels().iter().flatten().any(|v| *v > 1.5) && found.stops > 2.0);
+    let off = PrepareConfig { expand: None, ..config };
+    let refused = examine(&path, &off).unwrap_err().to_string();
+    assert!(refused.contains("sky.png") && refused.contains("switched off"), "{refused}");
+}
+
+/// The expected digits are `sha256sum`'s, of a file longer than the buffer that it is read with.
+#[test]
+fn a_files_hash_is_the_standards() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sky.exr");
+    let hash = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        content_hash(&path).unwrap().to_string()
+    };
+    assert_eq!(hash(b""), "e3b0c44298fc1c14");
+    assert_eq!(hash(b"a panorama, as far as its bytes go"), "1ed33f323d09ba02");
+    assert_eq!(hash(&[7; 200_000]), "8cfcba83dcfc81a1");
+    assert!(content_hash(&folder.path().join("none.exr")).unwrap_err().to_string().contains("none.exr"));
+}
+
 #[test]
 fn what_is_unfit_is_refused_and_says_why() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,9 +1,10 @@
 //! The classical bases: spherical harmonics and spherical Gaussians of the same dimension D.
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::Codec;
 use crate::baseline::{Baseline, Fitted, Kind, Space};
+use crate::canonical::Canonical;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 
@@ -46,9 +47,9 @@ impl Codec for Basis {
         self.system.dimension()
     }
 
-    fn key(&self) -> Value {
+    fn key(&self) -> Canonical {
         // sizes, space and search
-        json!({ "baseline": format!("{:?}", self.system) })
+        Canonical::of(json!({ "baseline": format!("{:?}", self.system) }))
     }
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {

@@ -9,9 +9,8 @@ pub(crate) mod model;
 pub use basis::Basis;
 pub use model::{Autoencoder, Optimised};
 
-use serde_json::Value;
-
 use crate::Result;
+use crate::canonical::Canonical;
 use veni_light::sphere::Equirect;
 
 /// A way to code a panorama at latent dimension D and to get it back.
@@ -26,7 +25,7 @@ pub trait Codec: Sync {
     fn dimension(&self) -> usize;
 
     /// Everything that decides a code besides the image: part of the key under which codes are kept.
-    fn key(&self) -> Value;
+    fn key(&self) -> Canonical;
 
     /// The code, D values, for an image of log radiance at exposure 0 (3·W·H values). They depend on nothing else, so
     /// that what is kept of one image stays true whatever it was coded beside.

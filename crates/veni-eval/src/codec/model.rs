@@ -1,8 +1,9 @@
 //! A model's two ways: its encoder, and a latent optimised for each image.
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::Codec;
+use crate::canonical::Canonical;
 use crate::fitting::FitSettings;
 use crate::{Error, Result};
 use veni_core::LoadedModel;
@@ -62,8 +63,8 @@ impl Codec for Autoencoder<'_> {
         self.subject.dimension() + LIGHT * self.subject.model().config().lights
     }
 
-    fn key(&self) -> Value {
-        json!({ "model": self.subject.identity(), "pass": "autoencoder" })
+    fn key(&self) -> Canonical {
+        Canonical::of(json!({ "model": self.subject.identity(), "pass": "autoencoder" }))
     }
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
@@ -88,17 +89,17 @@ impl Codec for Optimised<'_> {
         self.subject.dimension() + LIGHT * self.subject.model().config().lights
     }
 
-    fn key(&self) -> Value {
+    fn key(&self) -> Canonical {
         let start = match self.start {
             Start::Encoder => "encoder",
             Start::Zero => "zero",
         };
-        json!({
+        Canonical::of(json!({
             "model": self.subject.identity(),
             "pass": "optimised",
             "start": start,
             "fit": self.settings.key(),
-        })
+        }))
     }
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {

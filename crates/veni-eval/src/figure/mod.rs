@@ -8,4 +8,4 @@ mod sheet;
 pub use canvas::Canvas;
 pub use heat::{HEAT_RANGE, heat};
 pub use plot::{Axis, Plot, Series};
-pub use sheet::{Sheet, display};
+pub use sheet::{LabelledSheet, display};

@@ -17,6 +17,7 @@ use burn::tensor::activation::relu;
 use burn::tensor::module::{conv2d, max_pool2d};
 use burn::tensor::ops::{ConvOptions, MaxPoolOptions};
 use burn::tensor::{Device, Tensor, TensorData};
+use veni_core::train::config::DeviceKind;
 use veni_light::digest::Digest;
 
 use self::weights::{Convolution, LAYERS, LayerWeights};
@@ -56,9 +57,9 @@ impl Lpips {
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Invalid`] or [`Error::Unsupported`] naming the file and the tensor that is missing,
-    /// ambiguous, of another shape or not finite.
-    pub fn load(files: &[PathBuf], device: &Device) -> Result<Self> {
-        Ok(Self::new(weights::load(files)?, device))
+    /// ambiguous, of another shape or not finite, or if there is no such `device`.
+    pub fn load(files: &[PathBuf], device: DeviceKind) -> Result<Self> {
+        Ok(Self::new(weights::load(files)?, &device.device()?))
     }
 
     fn new(weights: Vec<LayerWeights>, device: &Device) -> Self {

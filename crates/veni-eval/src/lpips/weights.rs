@@ -96,9 +96,9 @@ fn find(files: &[(&Path, Checkpoint)], names: &[String], shape: &[usize]) -> Res
                 let Array { shape: found, data } = file.tensor(full).map_err(|e| e.in_file(path))?;
                 if found != shape {
                     return Err(Error::invalid(format!(
-                        "{}: tensor {full} is {found:?}, LPIPS with AlexNet has {shape:?}",
-                        path.display()
-                    )));
+                        "tensor {full} is {found:?}, LPIPS with AlexNet has {shape:?}"
+                    ))
+                    .in_file(path));
                 }
                 return Ok(data);
             }

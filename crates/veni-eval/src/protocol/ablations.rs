@@ -4,11 +4,12 @@
 //! are the experiment: trained alike but for one part.
 
 use super::quality::{self, Scored, reconstruct};
-use super::{Evaluation, Report, Share, consistency, equivariance, reconstruction};
+use super::{Evaluation, Report, consistency, equivariance, reconstruction};
 use crate::Result;
 use crate::codec::{Autoencoder, Codec, Optimised};
 use crate::fitting::FitSettings;
 use crate::table::{Cell, Table};
+use veni_data::Part;
 
 const COLUMNS: [&str; 13] = [
     "System",
@@ -61,9 +62,9 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As theirs.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    reconstruction::keep_models(run, share)?;
-    run.subjects.iter().try_for_each(|subject| consistency::keep_standard(run, subject, share))
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    reconstruction::keep_models(run, part)?;
+    run.subjects.iter().try_for_each(|subject| consistency::keep_standard(run, subject, part))
 }
 
 fn no_encoder() -> Cell {

@@ -7,12 +7,14 @@
 use serde_json::json;
 
 use super::work::Work;
-use super::{Evaluation, Report, Share};
+use super::{Evaluation, Report};
+use crate::canonical::Canonical;
 use crate::figure::{Axis, Plot, Series};
 use crate::store::Key;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
 use veni_core::LoadedModel;
+use veni_data::Part;
 use veni_image::metrics::{log_error, spearman, weighted_log_error};
 use veni_light::latent::Latent;
 use veni_light::random::{Purpose, stream};
@@ -81,20 +83,20 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As [`run`].
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
     let pairs = pairs(run)?;
     for subject in run.subjects {
-        distances(run, subject, Source::Standard, pairs).keep(run, share)?;
+        distances(run, subject, Source::Standard, pairs).keep(run, part)?;
         if subject.model().has_prior() {
-            distances(run, subject, Source::Prior, pairs).keep(run, share)?;
+            distances(run, subject, Source::Prior, pairs).keep(run, part)?;
         }
     }
     Ok(())
 }
 
 /// Of [`standard`] alone.
-pub(super) fn keep_standard(run: &Evaluation<'_>, subject: &LoadedModel, share: Share) -> Result<()> {
-    distances(run, subject, Source::Standard, pairs(run)?).keep(run, share)
+pub(super) fn keep_standard(run: &Evaluation<'_>, subject: &LoadedModel, part: Part) -> Result<()> {
+    distances(run, subject, Source::Standard, pairs(run)?).keep(run, part)
 }
 
 fn pairs(run: &Evaluation<'_>) -> Result<usize> {
@@ -144,10 +146,10 @@ fn distances<'a>(
     let key = |block: &std::ops::Range<usize>| Key {
         protocol: "consistency",
         name: format!("{}-{label}-{}", subject.name(), block.start),
-        decides: json!({
+        decides: Canonical::of(json!({
             "model": subject.identity(), "latents": label, "seed": seed,
             "first": block.start, "end": block.end, "grid": [grid.width, grid.height],
-        }),
+        })),
     };
     let keys: Vec<_> = blocks.iter().map(key).collect();
     let task = format!("{}, {BATCH} pairs each", subject.name());

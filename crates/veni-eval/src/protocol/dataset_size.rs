@@ -4,11 +4,12 @@
 //! one in the model file; models of one D are joined to a curve.
 
 use super::quality::{self, reconstruct};
-use super::{Evaluation, Report, Share, reconstruction};
+use super::{Evaluation, Report, reconstruction};
 use crate::figure::{Axis, Plot, Series};
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
 use veni_core::LoadedModel;
+use veni_data::Part;
 
 /// Table: reconstruction per number of training panoramas; LDR PSNR (exposure) as curves.
 ///
@@ -18,11 +19,11 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     let mut subjects = Vec::new();
     for subject in run.subjects {
         let size = subject.training_panoramas().ok_or_else(|| {
-            Error::invalid(format!(
-                "{}: its file does not say on how many panoramas it was trained; leave this model out, or train it \
-                 anew: a training run records it",
-                subject.name()
-            ))
+            Error::invalid(
+                "its file does not say on how many panoramas it was trained; leave this model out, or train it anew: a \
+                 training run records it",
+            )
+            .in_file(subject.name())
         })?;
         subjects.push((size, subject));
     }
@@ -66,8 +67,8 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As coding and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    reconstruction::keep_models(run, share)
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    reconstruction::keep_models(run, part)
 }
 
 fn curve(subject: &LoadedModel, pass: &str) -> String {

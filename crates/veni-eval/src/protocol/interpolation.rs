@@ -6,13 +6,14 @@
 //! length of the way relative to the direct distance of its ends (1: straight).
 
 use super::quality::{codes, coding};
-use super::{Evaluation, Report, Share};
+use super::{Evaluation, Report};
 use crate::codec::{Autoencoder, Codec, Optimised, model::latent};
-use crate::figure::{Axis, Plot, Series, Sheet, display};
+use crate::figure::{Axis, LabelledSheet, Plot, Series, display};
 use crate::fitting::FitSettings;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
 use veni_core::LoadedModel;
+use veni_data::Part;
 use veni_image::metrics::log_error;
 use veni_light::latent::Latent;
 
@@ -98,8 +99,8 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As coding and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    run.subjects.iter().try_for_each(|subject| coding(run, &*codec(run, subject)).keep(run, share))
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    run.subjects.iter().try_for_each(|subject| coding(run, &*codec(run, subject)).keep(run, part))
 }
 
 /// What gives the ends their latents.
@@ -137,7 +138,7 @@ fn draw(run: &Evaluation<'_>, subject: &LoadedModel, ways: &[Way], report: &mut 
     let last = (run.settings.frames - 1) as f64;
     let titles: Vec<_> = (0..run.settings.frames).map(|k| format!("t = {:.2}", k as f64 / last)).collect();
     let names: Vec<_> = ways.iter().map(|way| format!("{} - {}", way.from, way.to)).collect();
-    let mut sheet = Sheet::new(grid, &titles, &names);
+    let mut sheet = LabelledSheet::new(grid, &titles, &names);
     for (row, way) in ways.iter().enumerate() {
         for (column, frame) in way.frames.iter().enumerate() {
             sheet.place(column, row, &display(grid, frame));

@@ -10,14 +10,15 @@ use serde_json::json;
 
 use super::quality::{self, Quality, rate};
 use super::work::{Work, images};
-use super::{Evaluation, Report, Share};
-use crate::figure::{Axis, Plot, Series, Sheet, display};
+use super::{Evaluation, Report};
+use crate::canonical::Canonical;
+use crate::figure::{Axis, LabelledSheet, Plot, Series, display};
 use crate::store::Key;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
 use veni_core::LoadedModel;
 use veni_core::fit::{FitConfig, FitResult, fit_shaded, matching_exposure};
-use veni_data::Item;
+use veni_data::{Item, Part};
 use veni_fit::shade::{
     Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedImage, ShadedLoss, ShadingForm, Surface,
     Transfer,
@@ -139,10 +140,10 @@ fn mean(rows: &[One]) -> One {
 ///
 /// # Errors
 /// As rendering, fitting and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
     let set = if run.settings.quick { QUICK } else { WHOLE };
     for subject in run.subjects {
-        set.sweep.iter().try_for_each(|ks| fits(run, subject, set, *ks).keep(run, share))?;
+        set.sweep.iter().try_for_each(|ks| fits(run, subject, set, *ks).keep(run, part))?;
     }
     Ok(())
 }
@@ -153,10 +154,10 @@ fn fits<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel, set: Set, ks: f32) -
         .map(|(item, image)| Key {
             protocol: "inverse-rendering",
             name: format!("{}-{}-ks{ks}", item.name(), subject.name()),
-            decides: json!({
+            decides: Canonical::of(json!({
                 "model": subject.identity(), "set": [set.side, set.lights], "steps": set.steps, "prior": PRIOR,
                 "ks": ks, "shininess": SHININESS, "image": image,
-            }),
+            })),
         })
         .collect();
     let task = format!("{}, K_s = {ks}", subject.name());
@@ -215,7 +216,7 @@ fn fitted(subject: &LoadedModel, grid: Equirect, item: &Item, set: Set, ks: f32)
 
 /// Panorama, and the light found for each K_s.
 struct Balls {
-    sheet: Sheet,
+    sheet: LabelledSheet,
 }
 
 impl Balls {
@@ -223,7 +224,7 @@ impl Balls {
         let titles =
             std::iter::once("panorama".to_owned()).chain(set.sweep.iter().map(|ks| format!("K_s = {ks}")));
         let names: Vec<_> = run.data.items().iter().map(Item::name).collect();
-        Self { sheet: Sheet::new(run.data.grid(), &titles.collect::<Vec<_>>(), &names) }
+        Self { sheet: LabelledSheet::new(run.data.grid(), &titles.collect::<Vec<_>>(), &names) }
     }
 
     fn place(&mut self, run: &Evaluation<'_>, at: usize, row: usize, item: &Item, image: &[f32]) {

@@ -6,12 +6,12 @@
 //! |ln| of the ratio of their irradiances, and how many panoramas have one in one of the two only.
 
 use super::quality::reconstruct;
-use super::{Evaluation, Report, Share, reconstruction};
+use super::{Evaluation, Report, reconstruction};
 use crate::Result;
 use crate::codec::Codec;
 use crate::table::{Cell, Table};
-use veni_data::Item;
 use veni_data::parallel::parallel;
+use veni_data::{Item, Part};
 use veni_light::light::{CompactLight, EnvironmentMap, LightOptions, luminance};
 use veni_light::sphere::{Equirect, ways};
 
@@ -77,8 +77,8 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As coding and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    reconstruction::keep(run, share)
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    reconstruction::keep(run, part)
 }
 
 fn add(run: &Evaluation<'_>, codec: &dyn Codec, all: &mut Table, each: &mut Table) -> Result<()> {

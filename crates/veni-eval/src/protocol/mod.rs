@@ -16,7 +16,8 @@
 //! | [`paper`] | all of them but `light`, `spheres` and `realism`, with published numbers beside ours |
 //!
 //! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image; a
-//! [`Share`] of it can be computed beforehand, elsewhere.
+//! [`Part`](veni_data::Part) of it can be computed beforehand by `keep`, in processes that know nothing of each other, without tables or
+//! figures. Once all parts are there, `run` finds them and makes both.
 
 pub mod ablations;
 pub mod consistency;
@@ -31,7 +32,6 @@ mod published;
 mod quality;
 pub mod realism;
 pub mod reconstruction;
-mod share;
 pub mod spheres;
 #[cfg(test)]
 mod tests;
@@ -41,10 +41,9 @@ mod work;
 use std::path::{Path, PathBuf};
 
 pub use published::Published;
-pub use share::Share;
 
 use super::codec::{Autoencoder, Codec, Optimised};
-use super::figure::{Plot, Sheet};
+use super::figure::{LabelledSheet, Plot};
 use super::fitting::FitSettings;
 use super::lpips::Lpips;
 use super::store::Store;
@@ -140,7 +139,7 @@ impl<'a> Evaluation<'a> {
         Ok(())
     }
 
-    fn sheet(&self, name: &str, sheet: &Sheet, report: &mut Report) -> Result<()> {
+    fn sheet(&self, name: &str, sheet: &LabelledSheet, report: &mut Report) -> Result<()> {
         let path = self.figures.join(format!("{}.png", file_name(name)));
         sheet.write(&path)?;
         report.figures.push(path);

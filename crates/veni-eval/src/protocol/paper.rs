@@ -5,10 +5,11 @@
 
 use super::published::Published;
 use super::{
-    Evaluation, Report, Share, ablations, consistency, dataset_size, equivariance, interpolation,
-    inverse_rendering, reconstruction, uniqueness,
+    Evaluation, Report, ablations, consistency, dataset_size, equivariance, interpolation, inverse_rendering,
+    reconstruction, uniqueness,
 };
 use crate::Result;
+use veni_data::Part;
 
 /// All protocols in turn. `dataset-size` is left out, and said to be, unless two models name different sizes.
 ///
@@ -48,11 +49,11 @@ pub fn run(run: &Evaluation<'_>, published: &Published) -> Result<Report> {
 ///
 /// # Errors
 /// As theirs.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    reconstruction::keep(run, share)?;
-    uniqueness::keep(run, share)?;
-    consistency::keep(run, share)?;
-    inverse_rendering::keep(run, share)
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    reconstruction::keep(run, part)?;
+    uniqueness::keep(run, part)?;
+    consistency::keep(run, part)?;
+    inverse_rendering::keep(run, part)
 }
 
 /// The protocol's answer gets published numbers beside it.

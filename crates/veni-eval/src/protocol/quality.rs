@@ -9,6 +9,7 @@ use serde_json::json;
 use super::Evaluation;
 use super::work::{Work, images};
 use crate::Result;
+use crate::canonical::Canonical;
 use crate::codec::Codec;
 use crate::lpips::Lpips;
 use crate::store::Key;
@@ -87,7 +88,7 @@ pub(super) fn coding<'a>(run: &Evaluation<'a>, codec: &'a dyn Codec) -> Work<'a,
     let key = |(item, image): (&Item, serde_json::Value)| Key {
         protocol: "reconstruction",
         name: format!("{}-{}-{}", item.name(), codec.system(), codec.pass()),
-        decides: json!({ "codec": codec.key(), "image": image }),
+        decides: Canonical::of(json!({ "codec": codec.key(), "image": image })),
     };
     let keys: Vec<_> = items.iter().zip(images(run)).map(key).collect();
     let task = format!("{}, {}", codec.system(), codec.pass());

@@ -4,12 +4,12 @@
 //! fitted from there; the bases given beside), decoded, and scored under both definitions of the metrics.
 
 use super::quality::{self, Reconstructed, coding, reconstruct};
-use super::{Evaluation, Report, Share};
+use super::{Evaluation, Report};
 use crate::Result;
 use crate::codec::Codec;
-use crate::figure::{HEAT_RANGE, Sheet, display, heat};
+use crate::figure::{HEAT_RANGE, LabelledSheet, display, heat};
 use crate::table::{Cell, Table};
-use veni_data::Item;
+use veni_data::{Item, Part};
 
 /// Table 1: means per codec; table 2: every panorama; a sheet per system: target, reconstructions, their errors; and of several
 /// systems a sheet with the last pass of each side by side.
@@ -47,15 +47,15 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As coding and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    keep_models(run, share)?;
-    run.others.iter().try_for_each(|codec| coding(run, *codec).keep(run, share))
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    keep_models(run, part)?;
+    run.others.iter().try_for_each(|codec| coding(run, *codec).keep(run, part))
 }
 
 /// The models' own passes.
-pub(super) fn keep_models(run: &Evaluation<'_>, share: Share) -> Result<()> {
+pub(super) fn keep_models(run: &Evaluation<'_>, part: Part) -> Result<()> {
     for subject in run.subjects {
-        run.codecs(subject).iter().try_for_each(|codec| coding(run, &**codec).keep(run, share))?;
+        run.codecs(subject).iter().try_for_each(|codec| coding(run, &**codec).keep(run, part))?;
     }
     Ok(())
 }
@@ -89,12 +89,12 @@ fn system(
     Ok(results.pop().map(|(_, last)| (name.to_owned(), last.images)))
 }
 
-fn side_by_side(run: &Evaluation<'_>, columns: &[Column]) -> Sheet {
+fn side_by_side(run: &Evaluation<'_>, columns: &[Column]) -> LabelledSheet {
     let (grid, items) = (run.data.grid(), run.data.items());
     let titles = columns.iter().map(|(system, _)| system.clone());
     let titles: Vec<_> = std::iter::once("panorama".to_owned()).chain(titles).collect();
     let names: Vec<_> = items.iter().map(Item::name).collect();
-    let mut sheet = Sheet::new(grid, &titles, &names);
+    let mut sheet = LabelledSheet::new(grid, &titles, &names);
     for (row, item) in items.iter().enumerate() {
         let images = std::iter::once(item.log_radiance.as_slice())
             .chain(columns.iter().map(|(_, images)| images[row].as_slice()));
@@ -105,13 +105,13 @@ fn side_by_side(run: &Evaluation<'_>, columns: &[Column]) -> Sheet {
     sheet
 }
 
-fn sheet(run: &Evaluation<'_>, results: &[(&str, Reconstructed)]) -> Sheet {
+fn sheet(run: &Evaluation<'_>, results: &[(&str, Reconstructed)]) -> LabelledSheet {
     let (grid, items) = (run.data.grid(), run.data.items());
     let titles =
         results.iter().flat_map(|(pass, _)| [(*pass).to_owned(), format!("error, 0 to {HEAT_RANGE}")]);
     let titles: Vec<_> = std::iter::once("panorama".to_owned()).chain(titles).collect();
     let names: Vec<_> = items.iter().map(Item::name).collect();
-    let mut sheet = Sheet::new(grid, &titles, &names);
+    let mut sheet = LabelledSheet::new(grid, &titles, &names);
     for (row, item) in items.iter().enumerate() {
         sheet.place(0, row, &display(grid, &item.log_radiance));
         for (at, (_, result)) in results.iter().enumerate() {

@@ -6,10 +6,11 @@
 //! render's percentiles 0.1 and 99.9 went to 0 and 1. *Angle*: mean angle between RGB vectors, degrees.
 
 use super::quality::reconstruct;
-use super::{Evaluation, Report, Share, reconstruction};
+use super::{Evaluation, Report, reconstruction};
 use crate::Result;
 use crate::codec::Codec;
 use crate::table::{Cell, Table};
+use veni_data::Part;
 use veni_data::parallel::parallel;
 use veni_image::tonemap::quantile;
 use veni_light::sphere::Equirect;
@@ -56,8 +57,8 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As coding and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    reconstruction::keep(run, share)
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    reconstruction::keep(run, part)
 }
 
 fn add(

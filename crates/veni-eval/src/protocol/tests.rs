@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 
 use burn::tensor::Device;
-use serde_json::{Value, json};
 
 use super::*;
+use crate::canonical::Canonical;
 use crate::table::Cell;
 use veni_core::train::presets::Preset;
 use veni_core::vae::Veni;
@@ -106,8 +106,8 @@ impl Codec for Exact {
     fn dimension(&self) -> usize {
         3 * GRID.len()
     }
-    fn key(&self) -> Value {
-        json!("exact")
+    fn key(&self) -> Canonical {
+        Canonical::of("exact")
     }
     fn encode(&self, _: Equirect, image: &[f32]) -> Result<Vec<f32>> {
         Ok(image.to_vec())

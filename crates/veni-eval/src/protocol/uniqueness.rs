@@ -9,13 +9,15 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::work::{Work, images};
-use super::{Evaluation, Report, Share};
-use crate::figure::{Sheet, display, heat};
+use super::{Evaluation, Report};
+use crate::canonical::Canonical;
+use crate::figure::{LabelledSheet, display, heat};
 use crate::fitting::FitSettings;
 use crate::store::Key;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
 use veni_core::LoadedModel;
+use veni_data::Part;
 use veni_image::metrics::{log_error, weighted_log_error};
 use veni_light::digest::Digest;
 use veni_light::latent::Latent;
@@ -99,8 +101,8 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As fitting and writing fail.
-pub fn keep(run: &Evaluation<'_>, share: Share) -> Result<()> {
-    run.subjects.iter().try_for_each(|subject| pairs(run, subject).keep(run, share))
+pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
+    run.subjects.iter().try_for_each(|subject| pairs(run, subject).keep(run, part))
 }
 
 /// The reference implementation's rates for the two kinds of models.
@@ -122,9 +124,9 @@ fn pairs<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel) -> Work<'a, Pair> {
         .map(|(item, image)| Key {
             protocol: "uniqueness",
             name: format!("{}-{}", item.name(), subject.name()),
-            decides: json!({
+            decides: Canonical::of(json!({
                 "model": subject.identity(), "fit": fit.key(), "seed": seed, "image": image,
-            }),
+            })),
         })
         .collect();
     let task = format!("{}, two fits", subject.name());
@@ -154,7 +156,7 @@ fn measure(
     let (grid, items) = (run.data.grid(), run.data.items());
     let titles = ["panorama", "first fit", "second fit", "midpoint", "first - midpoint"].map(str::to_owned);
     let names: Vec<_> = items.iter().map(veni_data::Item::name).collect();
-    let mut sheet = Sheet::new(grid, &titles, &names);
+    let mut sheet = LabelledSheet::new(grid, &titles, &names);
     let mut measured = Vec::with_capacity(pairs.len());
     for (row, (item, pair)) in items.iter().zip(pairs).enumerate() {
         let (first, second) = (Latent::new(pair.first.clone()), Latent::new(pair.second.clone()));

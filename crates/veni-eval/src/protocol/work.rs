@@ -4,9 +4,10 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
-use super::{Evaluation, Share};
+use super::Evaluation;
 use crate::store::Key;
 use crate::{Error, Result};
+use veni_data::Part;
 use veni_data::parallel::parallel;
 use veni_light::digest::Digest;
 
@@ -37,8 +38,8 @@ impl<'a, T: Serialize + DeserializeOwned + Send> Work<'a, T> {
     }
 
     /// Keeps the values of a share of the keys.
-    pub(super) fn keep(&self, run: &Evaluation<'_>, share: Share) -> Result<()> {
-        let keys: Vec<_> = (0..self.keys.len()).filter(|index| share.has(*index)).collect();
+    pub(super) fn keep(&self, run: &Evaluation<'_>, part: Part) -> Result<()> {
+        let keys: Vec<_> = (0..self.keys.len()).filter(|index| part.has(*index)).collect();
         self.values(run, &keys).map(drop)
     }
 

@@ -120,6 +120,7 @@ impl ShadedImage {
     ///
     /// # Panics
     /// If there is not one log radiance per light.
+    #[doc(hidden)]
     pub fn display_terms(&self, log_radiance: &[[f32; 3]], log_exposure: f32) -> Option<[f64; 2]> {
         self.comparison.display_terms(&self.render(log_radiance, log_exposure))
     }

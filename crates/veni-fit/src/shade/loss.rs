@@ -42,6 +42,7 @@ impl Default for ShadedLoss {
 
 impl ShadedLoss {
     /// RENI++'s demonstration with its own weights.
+    #[doc(hidden)]
     pub fn demo() -> Self {
         Self::ReferenceDisplay { mse: 100.0, cosine: 1.0 }
     }

@@ -70,14 +70,6 @@ impl NormalMap {
         (length > LENGTHS[0] && length < LENGTHS[1]).then(|| unit_f32(normal)).flatten()
     }
 
-    /// Each vector (x, y, z) becomes (x, −y, z): from maps whose green channel grows downwards (as the reference
-    /// implementation does with all of its maps).
-    #[must_use]
-    pub fn flip_y(mut self) -> Self {
-        self.normals.iter_mut().for_each(|n| n[1] = -n[1]);
-        self
-    }
-
     /// Another size, bilinearly between pixel centres, without averaging where the map shrinks: what the authors do.
     /// Normals of an edge become too short to be [valid](Self::valid).
     #[must_use]
@@ -163,7 +155,6 @@ mod tests {
         let edge = NormalMap::new([2, 1], vec![[0.0; 3], [0.0, 1.0, 0.0]]).unwrap().resize(4, 1);
         let seen: Vec<_> = edge.normals().iter().map(|n| NormalMap::valid(*n).is_some()).collect();
         assert_eq!(seen, [false, false, true, true]);
-        assert_eq!(edge.flip_y().normals()[3], [0.0, -1.0, 0.0]);
         assert!(NormalMap::new([2, 2], vec![[0.0; 3]]).is_err());
     }
 

@@ -19,8 +19,7 @@ mod renderer;
 mod sky;
 
 use std::f32::consts::PI;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use camera::{Camera, unit};
@@ -29,6 +28,7 @@ use renderer::Renderer;
 use sky::Sky;
 use veni_gpu::wgpu;
 use veni_image::{luminance, tonemap::srgb};
+use veni_light::output::Overwrite;
 
 type Result<T, E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
@@ -182,14 +182,7 @@ fn write_png(file: &Path, [width, height]: [u32; 2], radiance: &[[f32; 3]]) -> R
     let curve = |v: f32| if v < 0.6 { v } else { 1.0 - 0.4 * (-(v - 0.6) / 0.4).exp() };
     let byte = |v: f32| (255.0 * srgb(curve(exposure * v)) + 0.5) as u8;
     let pixels: Vec<[u8; 3]> = radiance.iter().map(|p| p.map(byte)).collect();
-    let mut encoder = png::Encoder::new(BufWriter::new(File::create(file)?), width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(pixels.as_flattened())?;
-    writer.finish()?;
-    Ok(())
+    Ok(veni_image::write_png(file, [width as usize, height as usize], &pixels, Overwrite::Replace)?)
 }
 
 struct Options {

@@ -1,10 +1,9 @@
 //! Pictures: how noisy, and written as PNG.
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path;
 
 use veni_image::{luminance, tonemap::srgb};
+use veni_light::output::Overwrite;
 
 use crate::Result;
 
@@ -28,13 +27,5 @@ pub(crate) fn write_png(path: &Path, [width, height]: [u32; 2], radiance: &[[f32
     let aces = |v: f32| v * (2.51 * v + 0.03) / (v * (2.43 * v + 0.59) + 0.14);
     let byte = |v: f32| (255.0 * srgb(aces(exposure * v).clamp(0.0, 1.0)) + 0.5) as u8;
     let pixels: Vec<[u8; 3]> = radiance.iter().map(|rgb| rgb.map(byte)).collect();
-
-    let mut encoder = png::Encoder::new(BufWriter::new(File::create(path)?), width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(pixels.as_flattened())?;
-    writer.finish()?;
-    Ok(())
+    Ok(veni_image::write_png(path, [width as usize, height as usize], &pixels, Overwrite::Replace)?)
 }

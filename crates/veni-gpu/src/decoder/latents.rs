@@ -45,7 +45,7 @@ impl GpuDecoder {
     /// Folds a latent on the CPU (microseconds) and uploads it: a few kilobytes.
     ///
     /// # Errors
-    /// [`Error::Core`] if the latent does not fit the model, is not finite, or has lights or lobes, which the shaders do not draw;
+    /// [`Error::Light`] if the latent does not fit the model, is not finite, or has lights or lobes, which the shaders do not draw;
     /// [`Error::Gpu`] if there is no memory.
     pub fn condition(&self, queue: &Queue, latent: &Latent) -> Result<GpuLatents> {
         self.condition_batch(queue, std::slice::from_ref(latent))
@@ -88,7 +88,7 @@ impl GpuDecoder {
     /// what is submitted after it.
     ///
     /// # Errors
-    /// [`Error::Core`] as for [`GpuDecoder::condition`]; [`Error::Invalid`] if there is no room for them or the batch is
+    /// [`Error::Light`] as for [`GpuDecoder::condition`]; [`Error::Invalid`] if there is no room for them or the batch is
     /// another model's; [`Error::Gpu`] if the device fails.
     pub fn update(&self, queue: &Queue, into: &GpuLatents, first: u32, latents: &[Latent]) -> Result<()> {
         self.check_owner(into)?;

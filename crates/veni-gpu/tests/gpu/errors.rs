@@ -46,7 +46,7 @@ fn what_does_not_fit_is_named() {
     refused(&other, &Bake::rows(&small, grid, 0..1), &["model"]);
 
     let message = |latent: &Latent| match decoder.condition(queue, latent) {
-        Err(Error::Core(e)) => e.to_string(),
+        Err(Error::Light(e)) => e.to_string(),
         other => panic!("{other:?}"),
     };
     assert!(message(&latent(5, 1)).contains("5 vectors"));

@@ -61,7 +61,8 @@ fn fill_up() {
     // as large as what has just been refused
     let error = read_back::buffer(device, queue, &blocks[0]).unwrap_err();
     let Error::Gpu { what, cause } = &error else { panic!("{error:?}") };
-    assert!(what == "veni read back" && cause.to_lowercase().contains("memory"), "{error}");
+    assert!(what == "veni read back" && cause.to_string().to_lowercase().contains("memory"), "{error}");
+    assert!(std::error::Error::source(&error).is_some_and(|e| e.is::<veni_gpu::wgpu::Error>()), "{error:?}");
 
     blocks.truncate(blocks.len() / 2);
     device.poll(veni_gpu::wgpu::PollType::wait_indefinitely()).unwrap();

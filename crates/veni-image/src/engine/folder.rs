@@ -27,9 +27,7 @@ pub fn refuse_existing(folder: &Path, overwrite: Overwrite) -> Result<()> {
             let full = entries.next().is_some();
             if full && overwrite == Overwrite::Refuse { Err(Error::exists(folder)) } else { Ok(()) }
         }
-        Err(_) if folder.symlink_metadata().is_ok() => {
-            Err(Error::invalid(format!("{}: is no folder", folder.display())))
-        }
+        Err(_) if folder.symlink_metadata().is_ok() => Err(Error::invalid("is no folder").in_file(folder)),
         Err(_) => Ok(()),
     }
 }
@@ -37,9 +35,8 @@ pub fn refuse_existing(folder: &Path, overwrite: Overwrite) -> Result<()> {
 impl Folder {
     pub(super) fn begin(target: &Path, overwrite: Overwrite) -> Result<Self> {
         refuse_existing(target, overwrite)?;
-        let name = (target.file_name()).ok_or_else(|| {
-            Error::invalid(format!("{}: is not the name of a folder to make", target.display()))
-        })?;
+        let name = (target.file_name())
+            .ok_or_else(|| Error::invalid("is not the name of a folder to make").in_file(target))?;
         let staged =
             target.with_file_name(format!(".{}.{:016x}.part", name.to_string_lossy(), process_token()));
         fs::create_dir_all(&staged).map_err(|e| Error::io(target, "create", e))?;

@@ -162,7 +162,9 @@ fn hdr_exposure_and_signature() {
         assert_eq!(image.pixels(), [[0.125, 0.0625, 0.031_25], [0.125; 3]]);
     }
     fs::write(&path, b"#?RADIANCE\nFORMAT=32-bit_rle_abcd\n\n-Y 1 +X 2\n12345678").unwrap();
-    assert!(matches!(Panorama::read(&path), Err(Error::Unsupported(m)) if m.contains("32-bit_rle_abcd")));
+    assert!(
+        matches!(Panorama::read(&path), Err(Error::Unsupported { message, .. }) if message.contains("32-bit_rle_abcd"))
+    );
 }
 
 #[test]

@@ -1,7 +1,5 @@
 //! Where the light comes from: what decides on which side shadows fall.
 
-use glam::Vec3;
-
 use crate::luminance;
 use veni_light::sphere::Equirect;
 
@@ -28,24 +26,34 @@ pub fn sun_error(grid: Equirect, prediction: &[f32], target: &[f32]) -> Option<f
     (largest - mean / total >= VISIBLE).then(|| {
         let (a, b) = (brightest(grid, &log_luminance(grid, prediction)), brightest(grid, &target));
         // exact for small angles too, where the cosine is flat
-        f64::from(a.cross(b).length().atan2(a.dot(b)).to_degrees())
+        let across = cross(a, b);
+        f64::from(dot(across, across).sqrt().atan2(dot(a, b)).to_degrees())
     })
 }
 
 /// The direction (unit, z up) of the brightest light: the centre of the luminance within 10° of the brightest pixel.
-fn brightest(grid: Equirect, log_luminance: &[f64]) -> Vec3 {
+fn brightest(grid: Equirect, log_luminance: &[f64]) -> [f32; 3] {
     let peak =
         (0..log_luminance.len()).max_by(|a, b| log_luminance[*a].total_cmp(&log_luminance[*b])).unwrap_or(0);
     let directions = grid.directions();
-    let (towards, near) = (Vec3::from_array(directions[peak]), GLOW.to_radians().cos());
-    let mut sum = Vec3::ZERO;
-    for (k, (direction, ln)) in directions.into_iter().map(Vec3::from_array).zip(log_luminance).enumerate() {
-        if direction.dot(towards) >= near {
+    let (towards, near) = (directions[peak], GLOW.to_radians().cos());
+    let mut sum = [0f32; 3];
+    for (k, (direction, ln)) in directions.into_iter().zip(log_luminance).enumerate() {
+        if dot(direction, towards) >= near {
             let weight = (ln - log_luminance[peak]).exp() * grid.solid_angle(k / grid.width);
-            sum += weight as f32 * direction;
+            sum.iter_mut().zip(direction).for_each(|(sum, d)| *sum += weight as f32 * d);
         }
     }
-    sum.normalize()
+    let scale = 1.0 / dot(sum, sum).sqrt();
+    sum.map(|v| v * scale)
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross([ax, ay, az]: [f32; 3], [bx, by, bz]: [f32; 3]) -> [f32; 3] {
+    [ay * bz - by * az, az * bx - bz * ax, ax * by - bx * ay]
 }
 
 fn log_luminance(grid: Equirect, image: &[f32]) -> Vec<f64> {
@@ -73,8 +81,8 @@ mod tests {
     fn the_sun_is_where_it_was_put() {
         for (column, row) in [(5, 20), (127, 31), (64, 2)] {
             let found = brightest(GRID, &log_luminance(GRID, &sky(column, row)));
-            let put = Vec3::from_array(GRID.direction(column, row));
-            assert!(found.dot(put) > 0.5_f32.to_radians().cos(), "{found:?} {put:?}");
+            let put = GRID.direction(column, row);
+            assert!(dot(found, put) > 0.5_f32.to_radians().cos(), "{found:?} {put:?}");
         }
     }
 

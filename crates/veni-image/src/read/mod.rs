@@ -75,10 +75,12 @@ impl ReadOptions {
             return Err(Error::invalid(format!("the header says {width} × {height}: there are no pixels")));
         }
         if width.checked_mul(height).is_none_or(|n| n > self.max_pixels) {
-            return Err(Error::too_large(format!(
-                "the header claims {width} × {height} pixels, more than the limit of {}",
-                self.max_pixels
-            )));
+            let limit = self.max_pixels;
+            return Err(Error::beyond(
+                format!("the header claims {width} × {height} pixels, more than the limit of {limit}"),
+                (width as u64).saturating_mul(height as u64),
+                limit as u64,
+            ));
         }
         if width != 2 * height && !self.any_aspect {
             return Err(Error::invalid(format!(

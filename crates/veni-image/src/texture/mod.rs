@@ -15,7 +15,9 @@ mod tests;
 pub use env::{EnvHeader, EnvImage, EnvSpecular, env};
 pub use ktx1::ktx1;
 pub use ktx2::{Ktx2Header, ktx2};
-pub use rgbd::{from_rgbd, rgbd, rgbd_png};
+#[cfg(test)]
+pub(crate) use rgbd::from_rgbd;
+pub use rgbd::{rgbd, rgbd_png};
 pub use texel::TexelFormat;
 #[cfg(test)]
 pub(crate) use texel::{decode_e5b9g9r9, decode_r11g11b10};

@@ -1,5 +1,6 @@
 //! RGBD: radiance in an 8-bit image with alpha. Colour is (rgb · D)^(1/2.2), alpha is D ≤ 1, so that rgb · D ≤ 1 up to 255.
 
+use crate::encoder::encoder;
 use crate::{Error, Result};
 
 /// The largest radiance: D is 1/255 at least.
@@ -15,8 +16,9 @@ pub fn rgbd(texel: [f32; 3]) -> [u8; 4] {
     [colour[0], colour[1], colour[2], (d * 255.0).round() as u8]
 }
 
-/// Radiance of a texel.
-pub fn from_rgbd([r, g, b, d]: [u8; 4]) -> [f32; 3] {
+/// Radiance of a texel, as a renderer decodes it.
+#[cfg(test)]
+pub(crate) fn from_rgbd([r, g, b, d]: [u8; 4]) -> [f32; 3] {
     [r, g, b].map(|v| (f32::from(v) / 255.0).powf(2.2) / (f32::from(d) / 255.0))
 }
 
@@ -35,9 +37,7 @@ pub fn rgbd_png(size: usize, texels: &[[f32; 3]]) -> Result<Vec<u8>> {
     }
     let wrong = |e: png::EncodingError| Error::invalid(format!("PNG: {e}"));
     let mut file = Vec::new();
-    let mut encoder = png::Encoder::new(&mut file, size as u32, size as u32);
-    encoder.set_color(png::ColorType::Rgba);
-    encoder.set_depth(png::BitDepth::Eight);
+    let encoder = encoder(&mut file, [size, size], png::ColorType::Rgba)?;
     let mut writer = encoder.write_header().map_err(wrong)?;
     let bytes: Vec<[u8; 4]> = texels.chunks_exact(size).rev().flatten().map(|t| rgbd(*t)).collect();
     writer.write_image_data(bytes.as_flattened()).map_err(wrong)?;

@@ -3,7 +3,7 @@
 //! Two curves: [`Tonemap::reference`] is what the LDR metrics of the paper use (its own 98 % quantile becomes
 //! white, sRGB curve, clamped), and [`Tonemap::filmic`] is for previews that people look at.
 
-mod srgb;
+pub mod srgb;
 
 pub use srgb::{srgb, srgb_of_log, srgb_slope, srgb_to_linear};
 

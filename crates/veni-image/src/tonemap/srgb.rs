@@ -1,11 +1,15 @@
 //! The sRGB transfer function (IEC 61966-2-1) with the paper's constants, its inverse and its derivatives.
 
-/// Up to here the curve is a line; also the slope of that line, and the power's scale, offset and exponent.
-const KNEE: f64 = 0.003_130_8;
-const SLOPE: f64 = 12.92;
-const SCALE: f64 = 1.055;
-const OFFSET: f64 = 0.055;
-const GAMMA: f64 = 2.4;
+/// Up to this linear value the curve is a line.
+pub const KNEE: f64 = 0.003_130_8;
+/// The line's factor.
+pub const SLOPE: f64 = 12.92;
+/// The power's factor.
+pub const SCALE: f64 = 1.055;
+/// What is subtracted of the power.
+pub const OFFSET: f64 = 0.055;
+/// The power's exponent is 1 over this.
+pub const GAMMA: f64 = 2.4;
 
 /// 12.92 v up to 0.0031308, else 1.055 v^(1/2.4) − 0.055. Not clamped.
 pub fn srgb(v: f32) -> f32 {

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::half_range::{Dark, HALF_RANGE};
 use super::{Accept, HalfRange, Precision, SOFTWARE, WriteOptions, texts};
 use crate::colour::REC709;
-use crate::provenance::{Digest, PIXEL_DIGEST};
+use crate::provenance::{PIXEL_DIGEST, PixelDigest};
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 
@@ -60,7 +60,7 @@ pub(super) fn write(
         refuse_dark: precision == Precision::Half && options.half_range == HalfRange::Refuse,
         keep: header.own_attributes.other.contains_key(PIXEL_DIGEST.as_bytes()),
     };
-    let (mut digest, mut dark) = (Digest::new(grid), Dark::default());
+    let (mut digest, mut dark) = (PixelDigest::new(grid), Dark::default());
     // the closure below can only return the exr crate's own error
     let mut failure = None;
     let headers = [header.clone()].into_iter().collect();

@@ -5,7 +5,7 @@ use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::{Accept, SOFTWARE, WriteOptions, texts};
-use crate::provenance::{Digest, PIXEL_DIGEST};
+use crate::provenance::{PIXEL_DIGEST, PixelDigest};
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 
@@ -28,7 +28,7 @@ pub(super) fn write(
     let mut digest = None;
     for (name, value) in texts(options, 1.0, |name| MAX_LINE.saturating_sub(name.len() + 1))? {
         if name == PIXEL_DIGEST {
-            digest = Some((Digest::new(grid), header.len() + name.len() + 1));
+            digest = Some((PixelDigest::new(grid), header.len() + name.len() + 1));
         }
         if name.is_empty()
             || name.starts_with('#')
@@ -66,7 +66,7 @@ pub(super) fn write(
 }
 
 /// One row, which the digest sees as it is read; the column of a pixel that RGBE cannot hold otherwise.
-fn encode_row(pixels: &[[f32; 3]], out: &mut Vec<u8>, digest: Option<&mut Digest>) -> Result<(), usize> {
+fn encode_row(pixels: &[[f32; 3]], out: &mut Vec<u8>, digest: Option<&mut PixelDigest>) -> Result<(), usize> {
     let mut rgbe = Vec::with_capacity(pixels.len());
     for (column, &pixel) in pixels.iter().enumerate() {
         rgbe.push(encode(pixel).ok_or(column)?);

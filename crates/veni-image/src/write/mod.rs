@@ -12,7 +12,7 @@ use std::path::Path;
 use super::tonemap::Tonemap;
 use crate::numbered;
 use crate::panorama::Panorama;
-use crate::provenance::{Digest, PIXEL_DIGEST};
+use crate::provenance::{PIXEL_DIGEST, PixelDigest};
 use crate::{Error, Result};
 use veni_light::output::{Overwrite, write_atomic};
 use veni_light::sphere::Equirect;
@@ -42,7 +42,7 @@ fn texts(options: &WriteOptions, factor: f32, room: impl Fn(&str) -> usize) -> R
         all.insert(RADIANCE_SCALE.to_owned(), factor.to_string());
     }
     if !all.is_empty() {
-        all.insert(PIXEL_DIGEST.to_owned(), Digest::BLANK.to_owned());
+        all.insert(PIXEL_DIGEST.to_owned(), PixelDigest::BLANK.to_owned());
     }
     numbered::split(&all, room)
 }
@@ -80,10 +80,7 @@ impl WriteFormat {
             Some("exr") => Ok(Self::Exr(Precision::Half)),
             Some("hdr") => Ok(Self::Hdr),
             Some("png") => Ok(Self::Png(tonemap)),
-            _ => Err(Error::unsupported(format!(
-                "{}: panoramas are written as .exr, .hdr or .png",
-                path.display()
-            ))),
+            _ => Err(Error::unsupported("panoramas are written as .exr, .hdr or .png").in_file(path)),
         }
     }
 }
@@ -200,8 +197,7 @@ pub fn write_rows(
         WriteFormat::Png(tonemap) => png::write(file, path, grid, tonemap, options, run),
     });
     result.map_err(|e| match e {
-        // write_atomic names the path in its own refusal
-        Error::Invalid(m) if !m.starts_with(&path.display().to_string()) => Error::Invalid(m).in_file(path),
+        Error::Invalid { .. } => e.in_file(path),
         other => other,
     })
 }

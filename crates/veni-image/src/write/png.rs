@@ -7,6 +7,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::{Accept, SOFTWARE, WriteOptions};
+use crate::encoder::encoder;
 use crate::tonemap::Tonemap;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
@@ -23,12 +24,7 @@ pub(super) fn write(
         png::EncodingError::IoError(e) => Error::io(path, "write", e),
         other => Error::invalid(format!("PNG: {other}")),
     };
-    let side =
-        |n: usize| u32::try_from(n).map_err(|_| Error::invalid(format!("{n} is too long a side for PNG")));
-    let mut encoder = png::Encoder::new(file, side(grid.width)?, side(grid.height)?);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    let mut encoder = encoder(file, [grid.width, grid.height], png::ColorType::Rgb)?;
     encoder.add_itxt_chunk("Software".to_owned(), SOFTWARE.to_owned()).map_err(wrap)?;
     for (name, value) in &options.attributes {
         encoder.add_itxt_chunk(name.clone(), value.clone()).map_err(wrap)?;

@@ -137,10 +137,12 @@ impl Lights {
     /// finite, or whose radius is not between 0 and π; of kind `TooLarge` for more than [`MAX_LIGHTS`].
     pub fn check(&self) -> Result<()> {
         if self.all.len() > MAX_LIGHTS {
-            return Err(Error::too_large(format!(
-                "{} lights, at most {MAX_LIGHTS} are taken",
-                self.all.len()
-            )));
+            let count = self.all.len();
+            return Err(Error::beyond(
+                format!("{count} lights, at most {MAX_LIGHTS} are taken"),
+                count as u64,
+                MAX_LIGHTS as u64,
+            ));
         }
         for (at, light) in self.all.iter().enumerate() {
             let square: f32 = light.direction.iter().map(|c| c * c).sum();

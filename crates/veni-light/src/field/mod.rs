@@ -12,6 +12,14 @@
 //! All entry points give the same bits for the same direction: one direction, a batch, a baked panorama; but for the lights, of
 //! which a pixel holds the exact part that lies in it. Functions of log radiance leave the lights out. The kernels run at the
 //! widest SIMD the processor has.
+//!
+//! The residual perceptron of steps 2 to 4 is written six times, each for a speed or a language of its own:
+//! - `block`: a block of directions at a time, what everything here runs on; `single`: one direction. The same bits:
+//!   `tests/properties.rs`, `every_entry_point_gives_the_same_bits`.
+//! - `gradient/pass`: kept for the way back. Against differences of the reference: `tests/gradient.rs`.
+//! - WGSL (`veni-gpu/shaders`). Against `block`: `veni-gpu/tests/gpu/cross_check.rs`.
+//! - burn (`veni-core`, `vae::decoder`). Against these kernels: its `tests/kernels.rs`, values and gradients.
+//! - the reference in f64, by the definitions: `tests/reference.rs`, to which `block` is held at many sizes and in every form.
 
 mod aligned;
 mod bake;

@@ -230,7 +230,7 @@ mod tests {
             Latent::from_json(&text).unwrap_err()
         };
         assert!(
-            matches!(reason("\"format\":1", "\"format\":3"), Error::Unsupported(m) if m.contains("format 3"))
+            matches!(reason("\"format\":1", "\"format\":3"), Error::Unsupported { message, .. } if message.contains("format 3"))
         );
         for (from, to, says) in [
             ("\"n\":1", "\"n\":2", "n = 2"),
@@ -243,7 +243,10 @@ mod tests {
             ("{", "[", "not a latent"),
         ] {
             let error = reason(from, to);
-            assert!(matches!(&error, Error::Invalid(m) if m.contains(says)), "{from} → {to}: {error}");
+            assert!(
+                matches!(&error, Error::Invalid { message, .. } if message.contains(says)),
+                "{from} → {to}: {error}"
+            );
         }
     }
 

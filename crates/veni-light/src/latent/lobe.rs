@@ -47,7 +47,12 @@ impl Lobe {
     /// Refuses what is no lobe.
     pub(super) fn check(lobes: &[Self]) -> Result<()> {
         if lobes.len() > MAX_LOBES {
-            return Err(Error::too_large(format!("{} lobes, at most {MAX_LOBES} are taken", lobes.len())));
+            let count = lobes.len();
+            return Err(Error::beyond(
+                format!("{count} lobes, at most {MAX_LOBES} are taken"),
+                count as u64,
+                MAX_LOBES as u64,
+            ));
         }
         for (at, lobe) in lobes.iter().enumerate() {
             let square: f32 = lobe.direction.iter().map(|c| c * c).sum();

@@ -236,7 +236,7 @@ mod tests {
             (|e| (e.stripes, e.samples) = (1 << 16, None), "samples"),
         ] {
             let error = with(change).unwrap_err();
-            assert!(matches!(&error, Error::TooLarge(m) if m.contains(what)), "{error}");
+            assert!(matches!(&error, Error::TooLarge { message, .. } if message.contains(what)), "{error}");
         }
     }
 
@@ -259,7 +259,7 @@ mod tests {
             (4096, |d| (d.conditioning, d.hidden) = (Conditioning::Tokens, 512), "tokens"),
         ] {
             let error = with(vectors, change).unwrap_err();
-            assert!(matches!(&error, Error::TooLarge(m) if m.contains(what)), "{error}");
+            assert!(matches!(&error, Error::TooLarge { message, .. } if message.contains(what)), "{error}");
         }
     }
 }

@@ -42,7 +42,11 @@ impl Model {
     /// As [`Model::load`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         if bytes.len() as u64 > MAX_FILE_BYTES {
-            return Err(too_large());
+            return Err(Error::beyond(
+                format!("larger than {} MiB, not a veni model", MAX_FILE_BYTES >> 20),
+                bytes.len() as u64,
+                MAX_FILE_BYTES,
+            ));
         }
         let header = bytes.first_chunk().map_or(0, |length| u64::from_le_bytes(*length));
         if header <= bytes.len() as u64 {
@@ -101,10 +105,6 @@ impl Model {
         safetensors::serialize(parts, Some([("veni".to_owned(), json)].into_iter().collect()))
             .map_err(|e| Error::invalid(format!("the model cannot be written: {e}")))
     }
-}
-
-fn too_large() -> Error {
-    Error::too_large(format!("larger than {} MiB, not a veni model", MAX_FILE_BYTES >> 20))
 }
 
 fn values<const B: usize>(bytes: &[u8], decode: impl Fn([u8; B]) -> f32) -> Vec<f32> {

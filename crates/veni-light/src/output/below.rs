@@ -14,8 +14,8 @@ use crate::{Error, Result};
 pub fn below(folder: &Path, name: impl AsRef<Path>) -> Result<PathBuf> {
     let name = name.as_ref();
     let refused = |why: &str| {
-        let (folder, name) = (folder.display(), name.display());
-        Error::invalid(format!("{folder}: names {name}, {why}: nothing outside the folder is touched"))
+        let name = name.display();
+        Error::invalid(format!("names {name}, {why}: nothing outside the folder is touched")).in_file(folder)
     };
     if name.as_os_str().is_empty() {
         return Err(refused("which is no file"));

@@ -52,10 +52,8 @@ impl Lock {
     fn take(path: &Path, lock: impl Fn(&File) -> Result<(), TryLockError>) -> Result<Self> {
         // a link would have a file elsewhere emptied
         if path.is_symlink() {
-            let path = path.display();
-            return Err(Error::invalid(format!(
-                "{path}: is a symbolic link, where a lock should be; remove it"
-            )));
+            let link = Error::invalid("is a symbolic link, where a lock should be; remove it");
+            return Err(link.in_file(path));
         }
         let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
         let mut file = file.map_err(|e| Error::io(path, "create", e))?;

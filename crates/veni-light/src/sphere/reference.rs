@@ -12,6 +12,7 @@ use super::gather::Pair;
 
 /// A camera direction in the native frame. The map is a reflection and its own inverse, so it also takes native
 /// directions to the camera frame, and the reference's latent vectors to native ones and back.
+#[doc(hidden)]
 #[inline]
 pub fn camera_to_native([x, y, z]: [f32; 3]) -> [f32; 3] {
     [-y, -x, z]
@@ -82,6 +83,7 @@ pub fn image_uv([x, y, z]: [f32; 3]) -> [f32; 2] {
 ///
 /// # Panics
 /// If the image does not have W·H pixels.
+#[doc(hidden)]
 pub fn grid_sample(image: &[[f32; 3]], grid: Equirect, uv: [f32; 2]) -> [f32; 3] {
     assert_eq!(
         image.len(),
@@ -145,6 +147,7 @@ pub fn fibonacci_sphere(n: usize) -> Vec<[f32; 3]> {
 /// Patches of a [`fibonacci_disk`] on planes that touch the sphere, [patches, samples] row-major, not normalised.
 /// The centre of a patch is c = (s_y, s_z, −s_x) of a [`fibonacci_sphere`] point s; its disk has the radius
 /// tan(fov/2) and is spanned by e₁ = c × z normalised and e₂ = e₁ × c.
+#[doc(hidden)]
 pub fn double_fibonacci(patches: usize, samples: usize, fov_degrees: f64) -> Vec<[f32; 3]> {
     let radius = (0.5 * fov_degrees.to_radians()).tan();
     let disk = fibonacci_disk(samples);
@@ -164,6 +167,7 @@ pub fn double_fibonacci(patches: usize, samples: usize, fov_degrees: f64) -> Vec
 
 /// The reference implementation's rotation by pitch about x and yaw about z, rows first:
 /// [[cos y, sin y, 0], [−sin y, cos y, 0], [0, 0, 1]] · [[1, 0, 0], [0, cos p, sin p], [0, −sin p, cos p]].
+#[doc(hidden)]
 pub fn pitch_yaw(pitch: f32, yaw: f32) -> [[f32; 3]; 3] {
     let ((sp, cp), (sy, cy)) = (pitch.sin_cos(), yaw.sin_cos());
     [[cy, sy * cp, sy * sp], [-sy, cy * cp, cy * sp], [0.0, -sp, cp]]

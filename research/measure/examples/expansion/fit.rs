@@ -2,6 +2,7 @@
 
 use veni_core::expand::{Analysis, FEATURES, Region};
 use veni_core::panorama::{Transfer, luminance};
+use veni_light::cholesky;
 
 use crate::Failure;
 use crate::sample::{Sample, read};
@@ -31,7 +32,7 @@ pub(crate) fn run(folder: &str) -> Result<(), Failure> {
         }
         let Some(chosen) = analysis.sun_region() else { continue };
         let (Region { solid_angle, features, centre, .. }, [r, g, b]) = (&regions[chosen], energies[chosen]);
-        let mean = (0.2126 * r + 0.7152 * g + 0.0722 * b) / solid_angle;
+        let mean = f64::from(luminance([r, g, b].map(|v| v as f32))) / solid_angle;
         sun.add(features, mean.ln(), 1.0);
         if mean > SUNNY {
             let row = [1.0, f64::from(centre[2])];
@@ -44,10 +45,10 @@ pub(crate) fn run(folder: &str) -> Result<(), Failure> {
         panoramas.len(),
         crate::sample::STOPS
     );
-    println!("exponent: {},", exponent.solve("exponent"));
-    println!("sun: {},", sun.solve("sun"));
-    println!("red: {},", red.solve("red"));
-    println!("blue: {},", blue.solve("blue"));
+    println!("exponent: {},", exponent.solve("exponent")?);
+    println!("sun: {},", sun.solve("sun")?);
+    println!("red: {},", red.solve("red")?);
+    println!("blue: {},", blue.solve("blue")?);
     Ok(())
 }
 
@@ -68,23 +69,26 @@ impl<const N: usize> System<N> {
     }
 
     /// The unknowns, as Rust text; on stderr how much of the targets they explain.
-    fn solve(&self, name: &str) -> String {
-        let mut matrix = [[0f64; N]; N];
-        let mut right = [0f64; N];
+    fn solve(&self, name: &str) -> Result<String, Failure> {
+        let mut gram = [[0f64; N]; N];
+        let mut right = [[0f64]; N];
         let total: f64 = self.rows.iter().map(|r| r.2).sum();
         for (row, target, weight) in &self.rows {
             for i in 0..N {
-                right[i] += weight / total * row[i] * target;
+                right[i][0] += weight / total * row[i] * target;
                 for j in 0..N {
-                    matrix[i][j] += weight / total * row[i] * row[j];
+                    gram[i][j] += weight / total * row[i] * row[j];
                 }
             }
         }
-        for (i, row) in matrix.iter_mut().enumerate() {
+        for (i, row) in gram.iter_mut().enumerate() {
             // a trace of ridge keeps features that hardly vary from running away
             row[i] += 1e-4;
         }
-        let solution = gauss(matrix, right);
+        let gram = gram.as_flattened_mut();
+        cholesky::factor(gram, N).ok_or("the features depend on each other")?;
+        cholesky::substitute(gram, N, &mut right);
+        let solution = right.map(|[v]| v);
         let predict = |row: &[f64; N]| row.iter().zip(&solution).map(|(a, b)| a * b).sum::<f64>();
         let mean = self.rows.iter().map(|(_, t, w)| w * t).sum::<f64>() / total;
         let spread = |f: &dyn Fn(&[f64; N], f64) -> f64| {
@@ -92,28 +96,6 @@ impl<const N: usize> System<N> {
         };
         let (all, left) = (spread(&|_, t| t - mean), spread(&|r, t| t - predict(r)));
         eprintln!("{name}: {} rows, deviation {:.3} of {:.3}", self.rows.len(), left.sqrt(), all.sqrt());
-        format!("[{}]", solution.map(|v| format!("{v:.4}")).join(", "))
+        Ok(format!("[{}]", solution.map(|v| format!("{v:.4}")).join(", ")))
     }
-}
-
-/// Gaussian elimination with pivots.
-fn gauss<const N: usize>(mut a: [[f64; N]; N], mut b: [f64; N]) -> [f64; N] {
-    for k in 0..N {
-        let pivot = (k..N).max_by(|i, j| a[*i][k].abs().total_cmp(&a[*j][k].abs())).unwrap_or(k);
-        a.swap(k, pivot);
-        b.swap(k, pivot);
-        for i in k + 1..N {
-            let factor = a[i][k] / a[k][k];
-            let pivot = a[k];
-            a[i].iter_mut().zip(pivot).for_each(|(v, p)| *v -= factor * p);
-            b[i] -= factor * b[k];
-        }
-    }
-    for k in (0..N).rev() {
-        for j in k + 1..N {
-            b[k] -= a[k][j] * b[j];
-        }
-        b[k] /= a[k][k];
-    }
-    b
 }

@@ -11,6 +11,8 @@ use std::sync::Mutex;
 use veni_core::panorama::Panorama;
 use veni_core::panorama::tonemap::{Tonemap, quantile};
 use veni_core::synth::{Overrides, generate};
+use veni_image::Sheet;
+use veni_light::output::Overwrite;
 
 mod statistics;
 
@@ -18,19 +20,12 @@ use statistics::{GRID, statistics};
 
 fn sheet(path: &Path, panoramas: &[Panorama]) -> Result<(), Box<dyn Error>> {
     let columns = 8;
-    let rows = panoramas.len().div_ceil(columns);
-    let (w, h) = (GRID.width as u32 + 4, GRID.height as u32 + 4);
-    let mut out =
-        image::RgbImage::from_pixel(columns as u32 * w + 4, rows as u32 * h + 4, image::Rgb([24; 3]));
+    let mut out = Sheet::new(columns, panoramas.len().div_ceil(columns), GRID.width, GRID.height);
     for (k, panorama) in panoramas.iter().enumerate() {
         let tonemap = Tonemap::reference(panorama);
-        let (left, top) = ((k % columns) as u32 * w + 4, (k / columns) as u32 * h + 4);
-        for (at, pixel) in panorama.pixels().iter().enumerate() {
-            let (x, y) = ((at % GRID.width) as u32, (at / GRID.width) as u32);
-            out.put_pixel(left + x, top + y, image::Rgb(tonemap.apply_u8(*pixel)));
-        }
+        out.place(k % columns, k / columns, panorama.pixels().iter().map(|pixel| tonemap.apply_u8(*pixel)));
     }
-    Ok(out.save(path)?)
+    Ok(out.write(path, Overwrite::Replace)?)
 }
 
 fn files(folder: &Path) -> Result<Vec<PathBuf>, Box<dyn Error>> {

@@ -94,9 +94,9 @@ impl FitModel {
 
     /// The paper's protocol, on the pixels that were fitted.
     pub(super) fn score(&self, latent: &Latent, seen: &Observation) -> Result<Scores> {
-        let Equirect { width, height } = seen.grid;
-        let decoded = self.decode(seen.grid, latent)?;
-        Ok(scores(&decoded, &seen.log_radiance, height, width, Alignment::LogFactor))
+        let Equirect { width, height } = seen.grid();
+        let decoded = self.decode(seen.grid(), latent)?;
+        Ok(scores(&decoded, seen.log_radiance(), height, width, Alignment::LogFactor))
     }
 
     /// The best of the fits from every start.
@@ -118,7 +118,7 @@ impl FitModel {
 #[cfg(feature = "learn")]
 fn decoder(model: &Model) -> veni_light::Result<Decoder> {
     match model.decoder() {
-        Err(veni_light::Error::Unsupported(_)) => {
+        Err(veni_light::Error::Unsupported { .. }) => {
             let device = veni_core::train::config::DeviceKind::Flex.device()?;
             Ok(Decoder::Graph(Box::new(veni_core::vae::Decoder::from_model(model, &device)?)))
         }

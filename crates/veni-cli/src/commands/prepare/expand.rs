@@ -9,6 +9,7 @@ use veni_data::expand::ExpandOptions;
 use veni_data::expand::network::{Network, NetworkInput, NetworkOptions, NetworkOutput, NetworkScale};
 use veni_data::prepare::Expander;
 use veni_image::Transfer;
+use veni_light::digest::Digest;
 use veni_light::sphere::Equirect;
 
 use super::network::NetworkSettings;
@@ -133,16 +134,16 @@ impl Expand {
     }
 }
 
-/// The network and the start of its file's hash.
+/// The network and its file's digest.
 #[cfg(feature = "onnx")]
-fn load(model: &Path) -> Result<(Arc<dyn Network>, String)> {
+fn load(model: &Path) -> Result<(Arc<dyn Network>, Digest)> {
     let network = veni_data::expand::network::OnnxNetwork::load(model)?;
-    let digest = network.digest().to_string();
+    let digest = network.digest();
     Ok((Arc::new(network), digest))
 }
 
 #[cfg(not(feature = "onnx"))]
-fn load(model: &Path) -> Result<(Arc<dyn Network>, String)> {
+fn load(model: &Path) -> Result<(Arc<dyn Network>, Digest)> {
     bail!(
         "--expand-with {}: this veni-cli was built without an ONNX runtime; build it with --features onnx",
         model.display()

@@ -1,13 +1,15 @@
 //! The network that expanded images, as far as it is remembered.
 
 use serde::{Deserialize, Serialize};
+use veni_light::digest::Digest;
 
 /// What is remembered of the network: images made by another one are not gone on with.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct NetworkSettings {
     /// The file's name; it does not matter where it is.
     pub(super) model: String,
-    pub(super) sha256: String,
+    /// Of the file.
+    pub(super) sha256: Digest,
     pub(super) input: String,
     pub(super) output: String,
     pub(super) scale: String,
@@ -19,8 +21,8 @@ pub(super) struct NetworkSettings {
 impl PartialEq for NetworkSettings {
     /// The same network in a renamed file is the same.
     fn eq(&self, other: &Self) -> bool {
-        let rest = |s: &Self| [&s.sha256, &s.input, &s.output, &s.scale].map(String::clone);
-        rest(self) == rest(other) && self.size == other.size
+        let rest = |s: &Self| [&s.input, &s.output, &s.scale].map(String::clone);
+        self.sha256 == other.sha256 && rest(self) == rest(other) && self.size == other.size
     }
 }
 

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use veni_data::expand::network::Estimate;
 use veni_data::prepare::{Examined, Fingerprint, Split, capture};
 use veni_image::Sanitised;
+use veni_light::digest::Digest;
 
 use super::network::NetworkSettings;
 use super::scan::Source;
@@ -74,7 +75,7 @@ pub(super) struct Expansion {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct ByNetwork {
     pub(super) model: String,
-    pub(super) sha256: String,
+    pub(super) sha256: Digest,
     /// What its radiance was multiplied by.
     pub(super) factor: f32,
     /// Share of the clipped values for which it gave less than is stored.
@@ -114,7 +115,7 @@ impl Facts {
         let Sanitised { nan, infinite, not_positive } = examined.replaced;
         let by = |(estimate, network): (Estimate, &NetworkSettings)| ByNetwork {
             model: network.model.clone(),
-            sha256: network.sha256.clone(),
+            sha256: network.sha256,
             factor: estimate.factor,
             below: estimate.below,
         };

@@ -282,9 +282,10 @@ impl Store {
 
 /// Each shard has a log of its own; a run without shards reads all.
 fn log_name(shard: Shard) -> String {
-    match shard.place() {
-        (_, 1) => "records.jsonl".to_owned(),
-        (at, of) => format!("records-{}-of-{of}.jsonl", at + 1),
+    let part = shard.part();
+    match part.of() {
+        1 => "records.jsonl".to_owned(),
+        of => format!("records-{}-of-{of}.jsonl", part.number()),
     }
 }
 

@@ -3,6 +3,7 @@
 use super::LossForm;
 use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};
+use veni_image::tonemap::srgb::{GAMMA, KNEE, OFFSET, SCALE, SLOPE};
 
 /// Where radiance is compared. Inputs are log radiance always.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -70,10 +71,10 @@ fn white_point(target: &Tensor<4>) -> Tensor<4> {
 /// e^(x − white) clamped to `[0, 1]`, through the sRGB curve.
 fn display(log_radiance: Tensor<4>, white: Tensor<4>) -> Tensor<4> {
     let x = (log_radiance - white).clamp_max(0.0).exp();
-    let linear = x.clone() * 12.92;
+    let linear = x.clone() * SLOPE;
     // The power's derivative is infinite at 0, where it is not used: guarded, lest the unused branch give NaN.
-    let curved = x.clone().clamp_min(0.003_130_8).powf_scalar(1.0 / 2.4) * 1.055 - 0.055;
-    curved.mask_where(x.lower_elem(0.003_130_8), linear)
+    let curved = x.clone().clamp_min(KNEE).powf_scalar(1.0 / GAMMA) * SCALE - OFFSET;
+    curved.mask_where(x.lower_elem(KNEE), linear)
 }
 
 /// Only the brightest part of each target: the mean squared log error over the values of an image that are

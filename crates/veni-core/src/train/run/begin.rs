@@ -109,10 +109,10 @@ impl Trainer {
         let state = if path.exists() { Some(checkpoint::load(&path)?) } else { None };
         if let (None, Some(init)) = (&state, &config.init) {
             return Err(Error::invalid(format!(
-                "{}: is missing, and with it the weights that the run took from {}; start the run over",
-                path.display(),
+                "is missing, and with it the weights that the run took from {}; start the run over",
                 init.model.display()
-            )));
+            ))
+            .in_file(&path));
         }
         let done = state.as_ref().map_or(0, |(_, info)| info.step);
         let mut trainer = Self::fresh(folder, config, command, None, done, observer)?;

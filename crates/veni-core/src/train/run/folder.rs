@@ -54,8 +54,7 @@ pub(super) fn refuse_used(folder: &Path) -> Result<()> {
     if is_free(folder)? {
         return Ok(());
     }
-    let folder = folder.display();
-    Err(Error::invalid(format!("{folder}: is not empty; continue the run in it, or name a new folder")))
+    Err(Error::invalid("is not empty; continue the run in it, or name a new folder").in_file(folder))
 }
 
 /// Removes half-written files of processes that are no more.

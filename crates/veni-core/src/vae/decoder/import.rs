@@ -11,6 +11,7 @@ use veni_light::model::{Conditioning, DecoderConfig, Equivariance, Invariance};
 ///
 /// and under SO(3) or none the same as ours. The result is a permutation. `None` if RENI (2022) had no such network:
 /// it has Gram matrices, plain inputs, FiLM or concat.
+#[doc(hidden)]
 pub fn reni_2022_inputs(config: &DecoderConfig, latent_vectors: usize) -> Option<Vec<usize>> {
     let n = latent_vectors;
     if config.invariance != Invariance::GramMatrix

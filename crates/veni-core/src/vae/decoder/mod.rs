@@ -9,7 +9,7 @@
 //! [`Tokens`]), other invariants (Gram matrix) and other groups (SO(3), none).
 //!
 //! RENI (2022) is one of them. Its frame has y up, its first maps take their inputs in another order
-//! ([`reni_2022_inputs`]): both are matters of import, not of the network.
+//! (`reni_2022_inputs`): both are matters of import, not of the network.
 
 mod condition;
 mod import;

@@ -143,13 +143,13 @@ impl NetworkOptions {
         if height.is_some_and(|h| h != grid.height) || width.is_some_and(|w| w != grid.width) {
             let side = |side: Option<usize>| side.map_or("any".to_owned(), |n| n.to_string());
             return Err(Error::invalid(format!(
-                "{}: is made for images of {} × {} (width × height) and cannot be run at {} × {}: leave the size to it",
-                network.name(),
+                "is made for images of {} × {} (width × height) and cannot be run at {} × {}: leave the size to it",
                 side(width),
                 side(height),
                 grid.width,
                 grid.height
-            )));
+            ))
+            .in_file(network.name()));
         }
         Ok(())
     }

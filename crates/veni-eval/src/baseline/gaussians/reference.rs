@@ -29,6 +29,7 @@ struct Lobe {
 
 impl Grid {
     /// From the reference's option `row_col_gaussian_dims`, in its order.
+    #[doc(hidden)]
     pub fn from_row_col_gaussian_dims([columns, rows]: [usize; 2]) -> Self {
         Self { rows, columns }
     }

@@ -54,6 +54,7 @@ pub fn field(directions: &[[f32; 3]], coefficients: &[[f64; 3]], order: usize) -
 ///
 /// # Panics
 /// If there is not one probe per direction.
+#[doc(hidden)]
 pub fn field_gradient(directions: &[[f32; 3]], probe: &[[f64; 3]], order: usize) -> Vec<[f64; 3]> {
     assert_eq!(directions.len(), probe.len(), "one probe per direction");
     transposed(&Basis::new(order), &from_camera(directions), probe.iter().copied())

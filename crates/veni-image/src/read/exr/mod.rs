@@ -7,7 +7,6 @@ mod tags;
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use exr::math::Vec2;
@@ -25,46 +24,41 @@ use crate::{Panorama, Provenance, RADIANCE_SCALE};
 use veni_light::sphere::Equirect;
 
 pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -> Result<Panorama> {
-    guarded(|| {
-        let reader = exr::block::read(file, false).map_err(|e| wrap(e, path))?;
-        judge_parts(reader.headers(), options)?;
-        let choice = layers::choose(reader.headers(), options)?;
-        let header = reader.headers()[choice.part].clone();
-        let grid = judge(&header, options)?;
-        // the decoder's own view of the header: a damaged one may be walked through otherwise before
-        precheck::room(Some([grid.width as u64, grid.height as u64]), options)?;
-        let attributes = text(&header);
-        let meaning = if options.data {
-            Meaning::linear()
-        } else {
-            tags::meaning(&header, &attributes, choice.coloured)?
-        };
-        let mut panorama = Panorama::new(grid, vec![[0.0; 3]; grid.len()]);
-        let mut known = stored_window(&header, grid, choice.alpha.is_some());
-        pixels::read(reader, path, &choice, &header, &mut panorama.pixels, known.as_deref_mut(), grid)?;
-        panorama.attributes = attributes;
-        panorama.note_provenance();
-        panorama.notes.clone_from(&meaning.notes);
-        panorama.known = known;
-        if choice.alpha.is_some() {
-            cover(&mut panorama, options.data);
+    let reader = exr::block::read(file, false).map_err(|e| wrap(e, path))?;
+    judge_parts(reader.headers(), options)?;
+    let choice = layers::choose(reader.headers(), options)?;
+    let header = reader.headers()[choice.part].clone();
+    let grid = judge(&header, options)?;
+    // the decoder's own view of the header: a damaged one may be walked through otherwise before
+    precheck::room(Some([grid.width as u64, grid.height as u64]), options)?;
+    let attributes = text(&header);
+    let meaning =
+        if options.data { Meaning::linear() } else { tags::meaning(&header, &attributes, choice.coloured)? };
+    let mut panorama = Panorama::new(grid, vec![[0.0; 3]; grid.len()]);
+    let mut known = stored_window(&header, grid, choice.alpha.is_some());
+    pixels::read(reader, path, &choice, &header, &mut panorama.pixels, known.as_deref_mut(), grid)?;
+    panorama.attributes = attributes;
+    panorama.note_provenance();
+    panorama.notes.clone_from(&meaning.notes);
+    panorama.known = known;
+    if choice.alpha.is_some() {
+        cover(&mut panorama, options.data);
+    }
+    meaning.apply(&mut panorama.pixels);
+    match panorama.attributes.get(RADIANCE_SCALE) {
+        Some(factor) if panorama.provenance == Provenance::Changed => panorama.notes.push(format!(
+            "its pixels were changed after {RADIANCE_SCALE} = {factor} was written; they are taken as they are, not \
+             divided by it"
+        )),
+        Some(factor) => {
+            let factor = factor.parse().ok().filter(|f: &f32| f.is_normal() && *f > 0.0);
+            let factor = factor
+                .ok_or_else(|| Error::invalid(format!("attribute {RADIANCE_SCALE} is not a factor")))?;
+            panorama.scale(1.0 / factor);
         }
-        meaning.apply(&mut panorama.pixels);
-        match panorama.attributes.get(RADIANCE_SCALE) {
-            Some(factor) if panorama.provenance == Provenance::Changed => panorama.notes.push(format!(
-                "its pixels were changed after {RADIANCE_SCALE} = {factor} was written; they are taken as they are, not \
-                 divided by it"
-            )),
-            Some(factor) => {
-                let factor = factor.parse().ok().filter(|f: &f32| f.is_normal() && *f > 0.0);
-                let factor = factor
-                    .ok_or_else(|| Error::invalid(format!("attribute {RADIANCE_SCALE} is not a factor")))?;
-                panorama.scale(1.0 / factor);
-            }
-            None => {}
-        }
-        Ok(panorama)
-    })
+        None => {}
+    }
+    Ok(panorama)
 }
 
 /// What the data window leaves uncovered is unknown: 0 there and 1 elsewhere, as far as that has to be written down.
@@ -118,20 +112,12 @@ fn cover(panorama: &mut Panorama, data: bool) {
 }
 
 pub(super) fn attributes(file: impl Read + Seek, path: &Path) -> Result<BTreeMap<String, String>> {
-    guarded(|| {
-        let reader = exr::block::read(file, false).map_err(|e| wrap(e, path))?;
-        let mut all = BTreeMap::new();
-        for header in reader.headers().iter().rev() {
-            all.extend(text(header));
-        }
-        Ok(all)
-    })
-}
-
-/// Some damaged files make the decoder panic instead of returning an error; that must not reach the caller.
-fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
-    catch_unwind(AssertUnwindSafe(work))
-        .unwrap_or_else(|_| Err(Error::invalid("damaged EXR file: its decoder gave up on it")))
+    let reader = exr::block::read(file, false).map_err(|e| wrap(e, path))?;
+    let mut all = BTreeMap::new();
+    for header in reader.headers().iter().rev() {
+        all.extend(text(header));
+    }
+    Ok(all)
 }
 
 /// Checks everything the header says that the pixels will be allocated by.

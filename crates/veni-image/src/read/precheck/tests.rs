@@ -33,7 +33,7 @@ fn refused(found: Result<Size>, words: &[&str]) {
     for word in words {
         assert!(text.contains(word), "'{word}' is missing in: {text}");
     }
-    assert!(matches!(error, Error::TooLarge(_)) == words.contains(&"limit"), "{text}");
+    assert!(matches!(error, Error::TooLarge { .. }) == words.contains(&"limit"), "{text}");
 }
 
 #[test]

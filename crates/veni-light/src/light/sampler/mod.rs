@@ -179,9 +179,4 @@ impl<'a> Sampler<'a> {
     pub fn table(&self) -> impl Iterator<Item = (f32, u32)> + '_ {
         self.alias.cells().iter().map(|cell| (cell.keep, cell.other))
     }
-
-    /// scale, floor and even part of the density scale · (luminance − floor)₊ + even, for a shader.
-    pub fn density_factors(&self) -> [f32; 3] {
-        [self.scale, self.floor, self.even]
-    }
 }

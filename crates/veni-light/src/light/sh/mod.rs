@@ -94,14 +94,6 @@ impl<const L: usize> Sh<L> {
         Self { coefficients: self.coefficients.iter().zip(&other.coefficients).map(sum).collect() }
     }
 
-    /// Up to another order: higher bands are left out, or 0.
-    #[must_use]
-    pub fn to_order<const M: usize>(&self) -> Sh<M> {
-        let mut coefficients = self.coefficients.clone();
-        coefficients.resize(Sh::<M>::LEN, [0.0; 3]);
-        Sh { coefficients }
-    }
-
     /// Every band times a factor.
     #[must_use]
     pub fn banded(&self, factor: impl Fn(usize) -> f64) -> Self {
