@@ -55,9 +55,9 @@ fn a_scene_is_a_function_of_seed_and_index_whatever_the_threads() {
     assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), scene);
     // what is fixed is kept, and the rest stays as it was
     let overrides = Overrides { sun_azimuth: Some(12.0), turbidity: Some(4.0), ..overrides };
-    let turned = Scene::draw(5, 11, &overrides);
-    assert_eq!((turned.sun_azimuth, turned.turbidity), (12.0, 4.0));
-    assert_eq!(turned, Scene { sun_azimuth: 12.0, turbidity: 4.0, ..scene });
+    let other = Scene::draw(5, 11, &overrides);
+    assert_eq!((other.sun_azimuth, other.turbidity), (12.0, 4.0));
+    assert_eq!(other, Scene { sun_azimuth: 12.0, turbidity: 4.0, ..scene });
 }
 
 #[test]

@@ -50,7 +50,7 @@ const DEVICES: &str = "Devices: a graphics card bakes the same picture as the CP
         {}Examples:\n  \
         veni-cli bake --seed 7 -o sky.exr                      a random sky, 1024 x 512, half precision\n  \
         veni-cli bake --seed 7 -o sky.exr -o sky.png --size 4096\n  \
-        veni-cli bake sky.exr -o turned.exr --turn 90 --exposure -1\n  \
+        veni-cli bake sky.exr -o rotated.exr --turn 90 --exposure -1\n  \
         {}veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512\n  \
         veni-cli bake latents/*.json --out-dir skies --format exr,png\n  \
         veni-cli bake --seed 0 --count 1000 --out-dir skies --shard 2/4    the second of four processes{}",

@@ -218,19 +218,19 @@ impl Ibl {
         Ok(folders)
     }
 
-    /// Takes the sun out and turns everything.
+    /// Takes the sun out and rotates everything.
     fn split(&self, panorama: Panorama) -> Result<Split> {
         let angle = self.turn.to_radians();
-        let turned = |p: Panorama| if angle == 0.0 { p } else { p.turn(angle) };
+        let rotated = |p: Panorama| if angle == 0.0 { p } else { p.rotated(angle) };
         let light = LightOptions { lights: 1, ..LightOptions::default() }.of(panorama.environment()?)?;
         let up = light.irradiance([0.0, 0.0, 1.0]);
         match light.sun().filter(|_| self.sun == SunMode::Split) {
             Some(sun) => {
                 let rest = Panorama::new(panorama.grid(), light.residual().pixels().to_vec());
-                let sun = Some(sun.turned(angle));
-                Ok(Split { map: turned(rest), whole: Some(turned(panorama)), sun, up })
+                let sun = Some(sun.rotated(angle));
+                Ok(Split { map: rotated(rest), whole: Some(rotated(panorama)), sun, up })
             }
-            None => Ok(Split { map: turned(panorama), whole: None, sun: None, up }),
+            None => Ok(Split { map: rotated(panorama), whole: None, sun: None, up }),
         }
     }
 

@@ -32,7 +32,7 @@ impl Work {
         let request = Request {
             grid: Grid::List { count },
             frame: Frame::Gltf,
-            turn: 0.4,
+            rotation: 0.4,
             log_exposure: 0.25,
             largest: f32::MAX,
             logarithm: true,

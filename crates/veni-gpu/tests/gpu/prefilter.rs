@@ -129,7 +129,7 @@ fn levels_are_those_of_the_cpu_in_every_frame() {
     let model = pretrained();
     let decoder = GpuDecoder::new(device, &model).unwrap();
     let prefilter = GpuPrefilter::new(device).unwrap();
-    let turn = 0.7;
+    let angle = 0.7;
     for (frame, format, size, count, seed) in [
         (Frame::Blender, TextureFormat::Rgba32Float, 64, 5, 19),
         (Frame::Blender, TextureFormat::Rgba32Float, 64, 5, 7),
@@ -138,13 +138,13 @@ fn levels_are_those_of_the_cpu_in_every_frame() {
         (Frame::Bevy, TextureFormat::Rgba32Float, 16, 3, 19),
     ] {
         let latent = sky(&model, seed);
-        let pixels = model.decoder().unwrap().condition(&latent.turned(turn)).unwrap().bake(FINE);
+        let pixels = model.decoder().unwrap().condition(&latent.rotated(angle)).unwrap().bake(FINE);
         let latents = decoder.condition(queue, &latent).unwrap();
         let harmonics = gpu.analyse(&prefilter, &decoder, &[latent]);
         let levels = Levels::new(size, count, Law::Quadratic);
         let cpu = Prefilter::new(EnvironmentMap::new(FINE, &pixels).unwrap(), &[levels]);
         let chain = gpu.chain(format, size as u32, count as u32, 1);
-        let cube = PrefilteredCube::new(&chain, Law::Quadratic).frame(frame).turn(turn);
+        let cube = PrefilteredCube::new(&chain, Law::Quadratic).frame(frame).rotate(angle);
         let mut encoder = device.create_command_encoder(&Default::default());
         prefilter.bake(&mut encoder, &decoder, &latents, &harmonics, &cube).unwrap();
         queue.submit([encoder.finish()]);
@@ -170,7 +170,7 @@ fn levels_are_those_of_the_cpu_in_every_frame() {
         // the first level is the field
         let first = gpu.level(&chain, 0);
         let direct = gpu.texture(format, [size as u32, size as u32, 6]);
-        gpu.bake(&decoder, &latents, &Bake::cube(&direct).frame(frame).turn(turn));
+        gpu.bake(&decoder, &latents, &Bake::cube(&direct).frame(frame).rotate(angle));
         assert_eq!(first, gpu.read_texture(&direct));
     }
 }
@@ -334,7 +334,7 @@ fn what_does_not_fit_is_named() {
     };
     said(bake(&mut encoder, &PrefilteredCube::new(&flat, Law::Linear)), &["1 layers"]);
     let chain = gpu.chain(TextureFormat::Rgba32Float, 8, 2, 1);
-    said(bake(&mut encoder, &PrefilteredCube::new(&chain, Law::Linear).turn(f64::NAN)), &["NaN"]);
+    said(bake(&mut encoder, &PrefilteredCube::new(&chain, Law::Linear).rotate(f64::NAN)), &["NaN"]);
     // and what fits is still recorded
     small.analyse(&mut encoder, &decoder, &one, &room).unwrap();
     small.bake(&mut encoder, &decoder, &one, &room, &PrefilteredCube::new(&chain, Law::Linear)).unwrap();

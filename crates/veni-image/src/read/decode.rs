@@ -166,7 +166,7 @@ fn pixels(
         meaning = display::meaning(&tags)?;
         if let Some(bytes) = jpeg {
             match gain_map::find(bytes, stored)? {
-                Found::Map(map) => gain_map = Some(map.turned(orientation)),
+                Found::Map(map) => gain_map = Some(map.oriented(orientation)),
                 Found::Note(note) => meaning.note(note),
                 Found::None => {}
             }

@@ -97,9 +97,9 @@ impl Glow {
         if !rows.clone().any(near) {
             return;
         }
-        let turn = |fraction: f64| std::f64::consts::PI * (1.0 - 2.0 * fraction / grid.width as f64);
+        let azimuth = |fraction: f64| std::f64::consts::PI * (1.0 - 2.0 * fraction / grid.width as f64);
         let columns: Vec<(f64, f64)> =
-            (0..grid.width * n).map(|k| turn((k as f64 + 0.5) / n as f64).sin_cos()).collect();
+            (0..grid.width * n).map(|k| azimuth((k as f64 + 0.5) / n as f64).sin_cos()).collect();
         for (row, pixels) in rows.zip(pixels.chunks_exact_mut(grid.width)) {
             if !near(row) {
                 continue;

@@ -31,12 +31,12 @@ use crate::{Error, Result};
 pub struct Light {
     pub(super) grid: Equirect,
     pub(super) residual: Vec<[f32; 3]>,
-    /// The residual before any turn, at about 256 columns.
+    /// The residual before any rotation, at about 256 columns.
     coarse: Level,
     pub(super) lights: Lights,
     shares: Vec<f32>,
     pub(super) harmonics: Sh<2>,
-    /// How far this was turned, radians.
+    /// How far this was rotated, radians.
     pub(super) angle: f64,
 }
 
@@ -255,12 +255,12 @@ impl Light {
     pub fn irradiance(&self, normal: [f32; 3]) -> [f32; 3] {
         let (sin, cos) = self.angle.sin_cos();
         let [x, y, z] = normal.map(f64::from);
-        // the cells are as they were before the turn
-        let turned = [cos * x + sin * y, cos * y - sin * x, z];
+        // the cells are as they were before the rotation
+        let rotated = [cos * x + sin * y, cos * y - sin * x, z];
         let view = self.coarse.kept();
         let mut sum = [0.0; 3];
         for cell in (0..view.cells().len()).map(|index| view.cell(index)) {
-            let cosine: f64 = cell.direction.iter().zip(turned).map(|(d, n)| d * n).sum();
+            let cosine: f64 = cell.direction.iter().zip(rotated).map(|(d, n)| d * n).sum();
             let weight = cell.solid_angle * cosine.max(0.0);
             sum = [0, 1, 2].map(|c| sum[c] + weight * f64::from(cell.radiance[c]));
         }

@@ -27,7 +27,7 @@ mod sampler;
 pub mod sh;
 #[cfg(feature = "prefilter")]
 mod spectrum;
-mod turn;
+mod rotate;
 mod vector;
 
 pub use crate::compact::{CompactLight, Disc, Kind, Lights, RadiusSource};

@@ -80,7 +80,7 @@ fn scale_invariant_and_level_add_up_to_the_log_error() {
 }
 
 #[test]
-fn corrected_terms_turn_with_the_image() {
+fn corrected_terms_rotate_with_the_image() {
     let roll = |x: Tensor<4>| Tensor::cat(vec![x.clone().narrow(2, 6, W - 6), x.narrow(2, 0, 6)], 2);
     // the surfaces of the irradiance term are 26, at multiples of 45°
     let irradiance = WeightSchedule::Constant(0.0);

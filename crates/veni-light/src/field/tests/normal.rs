@@ -107,9 +107,9 @@ fn the_gradient_is_that_of_the_other_kernel_and_a_wrong_matrix_is_seen() {
     assert!((equations.loss - gradient.loss).abs() < 1e-6 * gradient.loss);
     // symmetric, and not what it is at another latent or with a sign changed
     let unknowns = flat.len();
-    let turned: Vec<f64> =
+    let transposed: Vec<f64> =
         (0..unknowns * unknowns).map(|k| equations.matrix[k % unknowns * unknowns + k / unknowns]).collect();
-    assert!(apart(&equations.matrix, &turned) < 1e-5);
+    assert!(apart(&equations.matrix, &transposed) < 1e-5);
     let (few, truth) = expected(&model, &at(3), &directions[..70]);
     let mut wrong = found(&model, &at(3), &few).matrix;
     assert!(apart(&wrong, &truth) < 1e-3);

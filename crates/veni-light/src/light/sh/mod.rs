@@ -1,4 +1,4 @@
-//! Real spherical harmonics of light: projected with exact pixel areas, turned exactly, made into irradiance, written as engines
+//! Real spherical harmonics of light: projected with exact pixel areas, rotated exactly, made into irradiance, written as engines
 //! read them. LIGHT (10) to (15).
 
 mod basis;

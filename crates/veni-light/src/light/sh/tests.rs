@@ -169,19 +169,19 @@ fn conventions_agree_on_the_irradiance() {
 }
 
 #[test]
-fn turns_are_those_of_the_picture() {
+fn rotations_are_those_of_the_picture() {
     let pixels = sky();
     let sh = Sh::<8>::of(EnvironmentMap::new(GRID, &pixels).unwrap());
     // 37 columns
     let angle = 2.0 * PI * 37.0 / 256.0;
-    let mut turned = pixels.clone();
-    for (row, before) in turned.chunks_exact_mut(256).zip(pixels.chunks_exact(256)) {
+    let mut rotated = pixels.clone();
+    for (row, before) in rotated.chunks_exact_mut(256).zip(pixels.chunks_exact(256)) {
         row.copy_from_slice(before);
         row.rotate_left(37);
     }
-    let expected = Sh::<8>::of(EnvironmentMap::new(GRID, &turned).unwrap());
-    assert!(near(&sh.turned(angle), &expected) < 1e-6, "{}", near(&sh.turned(angle), &expected));
-    assert!(near(&sh.turned(-angle), &expected) > 0.01, "the wrong way round must not pass");
+    let expected = Sh::<8>::of(EnvironmentMap::new(GRID, &rotated).unwrap());
+    assert!(near(&sh.rotated_about_z(angle), &expected) < 1e-6, "{}", near(&sh.rotated_about_z(angle), &expected));
+    assert!(near(&sh.rotated_about_z(-angle), &expected) > 0.01, "the wrong way round must not pass");
     // the same as a matrix, and a tilt there and back
     let (s, c) = (angle.sin() as f32, angle.cos() as f32);
     let matrix = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]];
