@@ -43,7 +43,7 @@ fn a_dimension_is_spent_as_said() {
 }
 
 #[test]
-fn every_system_improves_with_its_size_and_counts_its_numbers() {
+fn every_system_improves_with_its_size_and_counts_its_coefficients() {
     let grid = Equirect::new(32, 16);
     let image = sky(grid);
     for kind in [Kind::SphericalHarmonics, Kind::SphericalGaussians, Kind::GaussianMixture] {
