@@ -156,10 +156,10 @@ def to_authors(ours, sizes, seed=1):
     """Our weights as theirs. The queries and keys of the decoder, which we do not have, are drawn."""
     found = {theirs: there(ours[name]).contiguous() for name, theirs, there, _ in pairs(sizes) if name in ours}
     generator = torch.Generator().manual_seed(seed)
-    hidden, told = sizes.hidden, 3 * sizes.latent_vectors
+    hidden, condition = sizes.hidden, 3 * sizes.latent_vectors
     kind = ours["decoder.output.weight"].dtype
     for layer in (f"field.network.layers.{index}.mha" for index in range(sizes.layers)):
-        for part, inputs in (("query", hidden), ("key", told)):
+        for part, inputs in (("query", hidden), ("key", condition)):
             for name, shape in ((f"{layer}.{part}.weight", (hidden, inputs)), (f"{layer}.{part}.bias", (hidden,))):
                 drawn = (2 * torch.rand(shape, generator=generator) - 1) / math.sqrt(inputs)
                 found[name] = drawn.to(kind)

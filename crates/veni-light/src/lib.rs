@@ -11,7 +11,7 @@
 //! | [`random`] | streams of random numbers that are the same on every machine |
 //! | [`cholesky`] | small dense systems of equations |
 //! | [`digest`] | content as one short name |
-//! | [`progress`] | who is told how far long work has come |
+//! | [`progress`] | the observer of long work, to which progress is reported |
 //! | [`limits`] | how large a file may be, and what it may ask for |
 //! | [`output`] | files that are written beside their target and renamed |
 //!

@@ -12,7 +12,7 @@ mod network;
 mod obj;
 #[cfg(feature = "learn")]
 mod runs;
-pub mod watch;
+pub mod monitor;
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};

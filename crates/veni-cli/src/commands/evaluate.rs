@@ -25,7 +25,7 @@ use crate::args::Layer;
 use crate::output::with_remedy;
 use crate::part::fold;
 use crate::printable::printable_json;
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::{Outcome, Report, lines_to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
@@ -186,15 +186,15 @@ impl Evaluate {
             );
         }
         let published = self.published.as_deref().map(Published::load).transpose()?.unwrap_or_default();
-        let bars = Bars::new(report);
-        let files = inputs::panoramas(&self.data, self.fold, self.images, &bars)?;
+        let progress = ProgressBars::new(report);
+        let files = inputs::panoramas(&self.data, self.fold, self.images, &progress)?;
         inputs::check_folder(&self.out)?;
         let device = DeviceKind::Flex;
         let subjects = inputs::subjects(&self.models, device)?;
         let lpips =
             if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, &device.device()?)?) };
-        let data = Dataset::load_observed(&files, grid, &self.layer.options(), &bars);
-        bars.end();
+        let data = Dataset::load_observed(&files, grid, &self.layer.options(), &progress);
+        progress.end();
         let data = data.map_err(with_remedy)?;
         inputs::create_folder(&self.out)?;
         let (store, figures) = (Store::new(&self.out), self.out.join("figures"));
@@ -210,12 +210,12 @@ impl Evaluate {
             settings,
             store: &store,
             figures: &figures,
-            observer: &bars,
+            observer: &progress,
         };
         if self.shard.is_part() {
             let (at, of) = self.shard.place();
             let kept = self.protocol.keep(&evaluation, Share { at, of }).map_err(with_remedy);
-            bars.end();
+            progress.end();
             kept?;
             let (out, shard) = (self.out.display(), self.shard);
             let human =
@@ -224,7 +224,7 @@ impl Evaluate {
             return Ok(Outcome::Fine);
         }
         let found = self.protocol.run(&evaluation, &published).map_err(with_remedy);
-        bars.end();
+        progress.end();
         self.show(&found?, report)?;
         Ok(Outcome::Fine)
     }

@@ -25,7 +25,7 @@ use crate::latent_files::{LatentFiles, source_of};
 use crate::output::{self, with_remedy};
 use crate::piped;
 use crate::printable::printable_json;
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::{self, Outcome, Report, lines_to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
@@ -259,13 +259,13 @@ impl Fit {
         let vectors = model.latent_vectors();
         let config = self.settings.adapted(*config, partial, vectors);
         let (total, prior) = (config.most_updates(vectors) * starts.len() as u64, model.prior());
-        let bars = Bars::new(report);
-        bars.begin("", "step", Some(total));
+        let progress = ProgressBars::new(report);
+        progress.begin("", "step", Some(total));
         let target = observation.target().with_prior(&prior);
         let best = model.best_of(&target, &starts, &config, &mut |step, loss| {
-            bars.advance(step, &format!("loss {loss:.4}"));
+            progress.advance(step, &format!("loss {loss:.4}"));
         });
-        bars.end();
+        progress.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         let scores = match (partial, observation.clipped.is_some()) {
             (false, false) => Some(model.score(&best.latent, &observation)?),
@@ -309,11 +309,11 @@ impl Fit {
         self.check_starts(starts.len())?;
         self.shaded.exposed(&image, picture, model, &mut starts)?;
         let prior = model.prior();
-        let bars = Bars::new(report);
-        bars.begin("", "step", Some(config.steps * starts.len() as u64));
-        let mut observer = |step, loss| bars.advance(step, &format!("loss {loss:.4}"));
+        let progress = ProgressBars::new(report);
+        progress.begin("", "step", Some(config.steps * starts.len() as u64));
+        let mut observer = |step, loss| progress.advance(step, &format!("loss {loss:.4}"));
         let best = best_light(model.decoder(), &image, Some(&prior), &starts, &config, &mut observer);
-        bars.end();
+        progress.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         for latent in best.all.iter_mut().chain([&mut best.latent]) {
             latent.log_exposure = self.shaded.recorded(latent.log_exposure);

@@ -20,7 +20,7 @@ use veni_light::sphere::Equirect;
 use crate::args::{Decoding, Force, Layer};
 use crate::numbers::{finite, positive};
 use crate::output::with_remedy;
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
 use crate::source::{self, Named};
@@ -192,14 +192,14 @@ impl Ibl {
             exposure,
             sampling: folders.iter().any(|f| f.0 == Engine::Any).then(|| split.sampling()).transpose()?,
         };
-        let bars = Bars::new(report);
+        let progress = ProgressBars::new(report);
         let images: usize = folders.iter().map(|(engine, _)| engine.images(self.size)).sum();
-        Observer::begin(&bars, "image", "", 0, images);
+        Observer::begin(&progress, "image", "", 0, images);
         let outcome = report::each(&folders, |(engine, folder)| {
-            let files = engine::write(*engine, &sky, folder, overwrite, &bars).map_err(with_remedy)?;
+            let files = engine::write(*engine, &sky, folder, overwrite, &progress).map_err(with_remedy)?;
             self.report(*engine, folder, &files, &sky, unit, started, report)
         });
-        bars.end();
+        progress.end();
         outcome
     }
 

@@ -28,10 +28,10 @@ impl Sheet {
         let width = margin + columns.len() * (grid.width + GAP);
         let height = 20 + rows.len() * (grid.height + GAP);
         let mut sheet = Self { canvas: Canvas::new(width, height), cell: [grid.width, grid.height], margin };
-        let room = grid.width / LETTER[0] as usize;
+        let letters = grid.width / LETTER[0] as usize;
         for (column, title) in columns.iter().enumerate() {
             let [x, _] = sheet.corner(column, 0);
-            sheet.canvas.text(&shortened(title, room), [(x + grid.width / 2) as i32, 10], Alignment::Center);
+            sheet.canvas.text(&shortened(title, letters), [(x + grid.width / 2) as i32, 10], Alignment::Center);
         }
         for (row, name) in rows.iter().enumerate() {
             let [_, y] = sheet.corner(0, row);

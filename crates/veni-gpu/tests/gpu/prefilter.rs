@@ -320,23 +320,23 @@ fn what_does_not_fit_is_named() {
     let [small, other] = [4, 8].map(|degree| GpuPrefilter::with_degree(device, degree).unwrap());
     said(small.harmonics(0).unwrap_err(), &["0 latents"]);
     said(small.harmonics(1 << 20).unwrap_err(), &["max_storage_buffer_binding_size"]);
-    let room = small.harmonics(1).unwrap();
+    let workspace = small.harmonics(1).unwrap();
     let two = decoder.condition_batch(queue, &[latent(3, 1), latent(3, 2)]).unwrap();
     let one = decoder.condition(queue, &latent(3, 1)).unwrap();
     let mut encoder = device.create_command_encoder(&Default::default());
-    said(small.analyse(&mut encoder, &decoder, &two, &room).unwrap_err(), &["2 latents", "room"]);
-    said(other.analyse(&mut encoder, &decoder, &one, &room).unwrap_err(), &["degree 4", "8"]);
+    said(small.analyse(&mut encoder, &decoder, &two, &workspace).unwrap_err(), &["2 latents", "workspace"]);
+    said(other.analyse(&mut encoder, &decoder, &one, &workspace).unwrap_err(), &["degree 4", "8"]);
     let foreign = GpuDecoder::new(device, &filler(3, 8, 1)).unwrap();
-    said(small.analyse(&mut encoder, &foreign, &one, &room).unwrap_err(), &["model"]);
+    said(small.analyse(&mut encoder, &foreign, &one, &workspace).unwrap_err(), &["model"]);
     let flat = gpu.texture(TextureFormat::Rgba32Float, [8, 8, 1]);
     let bake = |encoder: &mut wgpu::CommandEncoder, cube: &PrefilteredCube<'_>| {
-        small.bake(encoder, &decoder, &one, &room, cube).unwrap_err()
+        small.bake(encoder, &decoder, &one, &workspace, cube).unwrap_err()
     };
     said(bake(&mut encoder, &PrefilteredCube::new(&flat, Law::Linear)), &["1 layers"]);
     let chain = gpu.chain(TextureFormat::Rgba32Float, 8, 2, 1);
     said(bake(&mut encoder, &PrefilteredCube::new(&chain, Law::Linear).rotate(f64::NAN)), &["NaN"]);
     // and what fits is still recorded
-    small.analyse(&mut encoder, &decoder, &one, &room).unwrap();
-    small.bake(&mut encoder, &decoder, &one, &room, &PrefilteredCube::new(&chain, Law::Linear)).unwrap();
+    small.analyse(&mut encoder, &decoder, &one, &workspace).unwrap();
+    small.bake(&mut encoder, &decoder, &one, &workspace, &PrefilteredCube::new(&chain, Law::Linear)).unwrap();
     queue.submit([encoder.finish()]);
 }

@@ -49,7 +49,7 @@ impl Field {
 
     fn batch(&self, directions: &[[f32; 3]], out: &mut [[f32; 3]], log: bool) {
         let (n, m) = (directions.len(), out.len());
-        assert!(n == m, "{n} directions need room for {n} radiances, not {m}");
+        assert!(n == m, "{n} directions need memory for {n} radiances, not {m}");
         if n <= TASK {
             return self.run(directions, out, log, &mut Aligned::default());
         }

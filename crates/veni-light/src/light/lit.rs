@@ -11,7 +11,7 @@ use crate::field::Field;
 use crate::sphere::Equirect;
 use crate::{Error, Result};
 
-/// What a surface or a lobe of the sun's size needs to be told of a panorama: a few compact lights, the sun first, and what is left
+/// What a surface or a lobe of the sun's size needs to know of a panorama: a few compact lights, the sun first, and what is left
 /// without them. Per channel the integral of the whole is that of the rest plus the lights' irradiances, by construction.
 ///
 /// ```
@@ -40,7 +40,7 @@ pub struct Light {
     pub(super) angle: f64,
 }
 
-/// How lights are told from the rest.
+/// How lights are separated from the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightOptions {
     /// So many lights are kept at most, the sun first; up to eight. Whether there is a sun, and what it is, does not depend on it.

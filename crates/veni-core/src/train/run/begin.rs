@@ -26,7 +26,7 @@ impl Trainer {
     }
 
     /// A run that is yet to [`begin`](Self::begin): its data and the weights that it starts from are read, nothing is
-    /// written. `observer` is told how far reading the data has come.
+    /// written. The progress of reading the data is reported to `observer`.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the configuration does not fit; what reading data and weights says.
