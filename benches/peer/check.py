@@ -109,11 +109,11 @@ def recorded(report, preset, path):
     def part(prefix):
         return {k.removeprefix(prefix): v for k, v in tensors.items() if k.startswith(prefix)}
 
-    batch, ours, values, slopes = part("batch."), part("weight."), part("loss."), part("gradient.")
+    batch, ours, values, given = part("batch."), part("weight."), part("loss."), part("gradient.")
     sizes = presets.of(preset, batch["noise"].shape[1])
     batch = training.Batch(*(batch[k] for k in ("directions", "log_radiance", "loss_directions", "target", "noise")))
     # what the loss does not depend on has no gradient there
-    slopes = {name: slopes.get(name, torch.zeros_like(w)) for name, w in ours.items()}
+    given = {name: given.get(name, torch.zeros_like(w)) for name, w in ours.items()}
     what = f"({preset}, N = {sizes.latent_vectors})"
     # the VN-ReLUs of a network that has learnt nothing amplify rounding; how much shows PyTorch's own
     exact = step(GRAPHS["folded"](sizes, ours, F64), sizes, batch, F64)[1]
@@ -125,7 +125,7 @@ def recorded(report, preset, path):
         error = difference(gradients, exact)
         report.within(f"gradients of the graph {name} in f32 {what} and of the folded in f64", error, 2e-2)
         allowed = max(allowed, 4 * error, 1e-4)
-    report.within(f"gradients of our step {what} and of the folded graph in f64", difference(slopes, exact), allowed)
+    report.within(f"gradients of our step {what} and of the folded graph in f64", difference(given, exact), allowed)
     bent = replace(sizes, losses={**sizes.losses, "mage": 1.01 * sizes.losses["mage"]})
     terms = {k: v.reshape(1) for k, v in step(graph(bent, ours), bent, batch, torch.float32)[0].items()}
     report.beyond("a weight of a loss that is 1 % off", difference(terms, values), 1e-4)

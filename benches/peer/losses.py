@@ -37,9 +37,9 @@ class Corrected:
             coarse = F.avg_pool2d(error, 2**scale) if scale else error
             # columns wrap around; rows at the poles, where the stencil does not fit, are left out
             wrapped = torch.cat([coarse[..., -1:], coarse, coarse[..., :1]], -1)
-            slopes = F.conv2d(wrapped, self.scharr).abs()
+            edges = F.conv2d(wrapped, self.scharr).abs()
             inner = solid_angle(coarse.shape[2], error.dtype)[0, 1:-1, :, 0]
-            total = total + (slopes * (inner / inner.mean())).mean()
+            total = total + (edges * (inner / inner.mean())).mean()
         return total / 2
 
     def scale_invariant(self, prediction, target):
@@ -47,7 +47,7 @@ class Corrected:
         mean = (error * self.rows).mean((1, 2, 3), keepdim=True)
         return ((error - mean).square() * self.rows).mean()
 
-    def level(self, prediction, target):
+    def exposure(self, prediction, target):
         return ((prediction - target) * self.rows).mean((1, 2, 3)).square().mean()
 
     def cosine(self, prediction, target):

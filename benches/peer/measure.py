@@ -24,7 +24,7 @@ PROGRAMS = ("ours", "authors", "folded")
 MIXED = ("ours", "ours-mixed", "folded", "folded-mixed")
 # What our losses and VN-ReLUs are called in the authors' form
 REFERENCE = [
-    "loss.form=reference", "loss.level=0.0", "model.encoder.vn_relu=reference", "model.decoder.vn_relu=reference",
+    "loss.form=reference", "loss.exposure=0.0", "model.encoder.vn_relu=reference", "model.decoder.vn_relu=reference",
 ]
 # glibc gives large blocks back to the system and gets them page by page; ours does not use glibc's allocator
 ALLOCATOR = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": str(1 << 34), "MALLOC_TOP_PAD_": str(1 << 28)}
@@ -36,7 +36,7 @@ SAME = ("preset", "latent_vectors", "panoramas", "directions", "parameters")
 
 def command(program, preset, latent_vectors, options, record=None):
     if program.startswith("ours"):
-        mixed = ["decoder_by=kernels-bfloat16"] if program == "ours-mixed" else []
+        mixed = ["decoder_backend=kernels-bfloat16"] if program == "ours-mixed" else []
         extra = (["--record", record] if record else []) + mixed + (REFERENCE if options.form == "reference" else [])
         return [options.veni, str(DATA), preset, latent_vectors, str(options.steps), *extra]
     graph, _, mixed = program.partition("-")

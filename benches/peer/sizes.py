@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 REFERENCE_LOSSES = {"mage": 0.5, "scale_invariant": 1.0, "cosine": 1.0, "kld": 0.01}
-PAPER_LOSSES = {**REFERENCE_LOSSES, "level": 1.0}
+PAPER_LOSSES = {**REFERENCE_LOSSES, "exposure": 1.0}
 SMALL_LOSSES = {**PAPER_LOSSES, "mage": 0.1, "cosine": 0.1, "kld": 0.02, "ldr_mse": 15.0}
 
 
@@ -53,7 +53,7 @@ class Sizes:
 
     def reference(self):
         """The same network and weights as the authors' program computes them."""
-        kept = {name: weight for name, weight in self.losses.items() if name != "level"}
+        kept = {name: weight for name, weight in self.losses.items() if name != "exposure"}
         return replace(self, form="reference", losses=kept)
 
 

@@ -220,7 +220,7 @@ fn what_cannot_be_fitted_is_refused_before_any_work() {
     refused(&[&sky, "-o", "a.json", "--completed", "c.exr", "--size", "8x8"], &["--size 8x8"]);
     refused(&[&sky, "--prior=-1"], &["prior = -1"]);
     refused(&[&sky, "--share", "0.1"], &["--share", "--preset energy"]);
-    refused(&[&sky, "--preset", "energy", "--share", "2"], &["share = 2", "0..=1"]);
+    refused(&[&sky, "--preset", "energy", "--share", "2"], &["weight = 2", "0..=1"]);
     refused(&[&sky, "--resolution", "32x32"], &["--resolution"]);
     let marquardt = ["--method", "levenberg-marquardt"];
     refused(&[&[sky.as_str(), "--rate", "0.1"][..], &marquardt].concat(), &["--rate", "adam"]);

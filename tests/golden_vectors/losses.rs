@@ -41,7 +41,7 @@ fn weighted(case: &Case, device: &Device) {
         mage_scales: case.size("scales").unwrap_or(2),
         mage: weight("mage"),
         scale_invariant: weight("scale_inv"),
-        level: WeightSchedule::Constant(0.0),
+        exposure: WeightSchedule::Constant(0.0),
         cosine: weight("cosine"),
         kld: weight("kld"),
         log_mse: weight("log_mse"),

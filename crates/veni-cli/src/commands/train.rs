@@ -177,7 +177,7 @@ fn note_device(config: &TrainConfig, report: Report) -> Result<()> {
         }
     }
     if config.decoder_backend.is_kernels() {
-        report.note("decoder_by = kernels: the decoder is computed by the processor, not on the device");
+        report.note("decoder_backend = kernels: the decoder is computed by the processor, not on the device");
     }
     Ok(())
 }

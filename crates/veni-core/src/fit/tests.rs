@@ -39,7 +39,7 @@ fn objectives() -> [Objective; 7] {
         Objective::LogError,
         Objective::LogAbsolute,
         Objective::Display { log: 0.01 },
-        Objective::Energy { share: 0.4 },
+        Objective::Energy { weight: 0.4 },
         Objective::ReferenceLogError,
         Objective::CosineScaleInvariant,
         Objective::Terms(LossConfig { mage_scales: 1, ..LossConfig::default() }),

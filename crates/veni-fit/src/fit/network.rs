@@ -128,7 +128,7 @@ impl<'a> Network<'a> {
         match loss {
             ImageLoss::Pixels(images) => Ok(field.normal_equations(directions, |i, p| {
                 let value = images[b].at(i, p.map(f64::from));
-                let [gradient, weight] = [value.gradient, value.curvature].map(|v| v.map(|v| v as f32));
+                let [gradient, weight] = [value.gradient, value.gauss_newton].map(|v| v.map(|v| v as f32));
                 LocalQuadratic { loss: value.loss, gradient, weight }
             })),
             ImageLoss::Linear(target) => {

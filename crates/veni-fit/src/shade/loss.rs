@@ -4,7 +4,7 @@ use super::Transfer;
 use super::transfer::check_image;
 use super::vector::dot;
 use crate::{Error, Result};
-use veni_image::tonemap::{REFERENCE_QUANTILE, quantile, srgb, srgb_slope};
+use veni_image::tonemap::{REFERENCE_QUANTILE, quantile, srgb, srgb_derivative};
 
 /// What [`ShadedImage`](super::ShadedImage) minimises: R is the rendering, T the target, both linear radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -163,7 +163,7 @@ impl Comparison {
 fn display(r: [f64; 3], t: [f64; 3], white: f64) -> ([f64; 2], [[f64; 3]; 2]) {
     let shown = |v: [f64; 3]| v.map(|v| f64::from(srgb((v / white) as f32)));
     let (a, b) = (shown(r), shown(t));
-    let derivative = r.map(|v| srgb_slope(v / white) / white);
+    let derivative = r.map(|v| srgb_derivative(v / white) / white);
     let difference = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let square = dot(difference, difference) / 3.0;
     let squares = [0, 1, 2].map(|c| 2.0 / 3.0 * difference[c] * derivative[c]);

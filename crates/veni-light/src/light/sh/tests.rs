@@ -267,7 +267,7 @@ mod of_a_field {
     use crate::model::Model;
 
     /// Against central differences: the gradient of Σ ∂ c along a direction in the latent.
-    fn slopes(value: impl Fn(&Latent) -> f64, latent: &Latent, gradient: &[[f32; 3]]) -> (f64, f64) {
+    fn derivatives(value: impl Fn(&Latent) -> f64, latent: &Latent, gradient: &[[f32; 3]]) -> (f64, f64) {
         let step = 2e-3;
         let way: Vec<[f32; 3]> = (0..latent.vectors.len())
             .map(|k| [0, 1, 2].map(|c| ((7 * k + 3 * c) % 5) as f32 / 2.0 - 1.0))
@@ -285,7 +285,7 @@ mod of_a_field {
     }
 
     #[test]
-    fn pull_backs_are_the_slopes() {
+    fn pull_backs_are_the_gradients() {
         let model = Model::pretrained();
         let decoder = model.decoder().unwrap();
         let latent = Latent::from_seed(&model.prior(), 5);
@@ -300,9 +300,9 @@ mod of_a_field {
         };
         let gradient = cotangent.pull_back(&field, grid);
         assert!((gradient.loss / value(&latent) - 1.0).abs() < 1e-4);
-        let (slope, along) = slopes(value, &latent, &gradient.vectors);
-        assert!((slope - along).abs() < 2e-2 * slope.abs(), "{slope} {along}");
-        // radiance is e^s times what the latent says: the slope by the log exposure is the value itself
+        let (difference, along) = derivatives(value, &latent, &gradient.vectors);
+        assert!((difference - along).abs() < 2e-2 * difference.abs(), "{difference} {along}");
+        // radiance is e^s times what the latent says: the derivative by the log exposure is the value itself
         assert!((f64::from(gradient.log_exposure) / gradient.loss - 1.0).abs() < 1e-4);
 
         let normals = [([0.0, 0.0, 1.0], [0.2, 0.7, 0.1]), ([0.6, 0.0, 0.8], [1.0, -0.5, 0.0])];
@@ -320,7 +320,7 @@ mod of_a_field {
         };
         let gradient = pull_back_irradiance(&field, grid, &normals);
         assert!((gradient.loss / value(&latent) - 1.0).abs() < 1e-4);
-        let (slope, along) = slopes(value, &latent, &gradient.vectors);
-        assert!((slope - along).abs() < 2e-2 * slope.abs(), "{slope} {along}");
+        let (difference, along) = derivatives(value, &latent, &gradient.vectors);
+        assert!((difference - along).abs() < 2e-2 * difference.abs(), "{difference} {along}");
     }
 }
