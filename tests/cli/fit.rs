@@ -251,7 +251,7 @@ fn the_light_on_a_ball_is_found() {
     let dull = ["ball.exr", "--normals", "n.exr", "--lights", "32", "-o", "dull.json", "--starts", "2"];
     let dull = fit(&dir, &dull);
     assert!(dull["loss"].as_f64() > found["loss"].as_f64(), "{dull} {found}");
-    // the reference's form shades otherwise than this picture was shaded: it is fitted too, but not as well
+    // the reference's form shades otherwise than this image was rendered: it is fitted too, but not as well
     let reference = |steps: &str| {
         let args = [&all[..], &["--shading", "reference", "--force", "--steps", steps]].concat();
         let [value] = &dir.json(&[&["fit", "--model", model()], &args[..]].concat())[..] else {

@@ -152,7 +152,7 @@ impl FitConfig {
         Self { objective: Objective::Energy { weight: ENERGY_WEIGHT }, ..Self::thorough() }
     }
 
-    /// For the light on a surface ([`fit_shaded`](super::fit_shaded)), whose loss is not a sum over the light's pixels.
+    /// For the light on a surface ([`fit_rendered`](super::fit_rendered)), whose loss is not a sum over the light's pixels.
     pub fn light() -> Self {
         Self { method: Method::Adam, learning_rate: exponential(5e-2, 2e-3, 400), ..Self::thorough() }
     }

@@ -41,7 +41,7 @@ pub(super) fn optimise(
 fn unsuited(loss: &ImageLoss<'_>) -> Error {
     let why = match loss {
         ImageLoss::Whole(_) => "the objective looks at whole images",
-        ImageLoss::Shaded(_) => "the light on a surface is seen mixed, not pixel by pixel",
+        ImageLoss::Rendered(_) => "the light on a surface is seen mixed, not pixel by pixel",
         ImageLoss::Pixels(_) | ImageLoss::Linear(_) => "this decoder cannot be folded",
     };
     Error::invalid(format!("the method levenberg-marquardt does not apply: {why}; use adam, or auto"))
