@@ -15,7 +15,7 @@ use veni_image::tonemap::Tonemap;
 use veni_image::{Panorama, Precision};
 use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
-use veni_synth::{Overrides, Place, Scene, SkyKind, generate};
+use veni_synth::{Overrides, Setting, Scene, SkyKind, generate};
 
 use crate::args::Force;
 use crate::features::{LEARN, only};
@@ -78,8 +78,8 @@ pub(crate) struct Synth {
     scene: Option<SkyKind>,
 
     /// What stands around the viewer
-    #[arg(long, value_name = "PLACE", value_parser = named(&Place::ALL, Place::name))]
-    place: Option<Place>,
+    #[arg(long, value_name = "PLACE", value_parser = named(&Setting::ALL, Setting::name))]
+    place: Option<Setting>,
 
     /// Height of the sun above the horizon; negative after sunset
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
@@ -219,7 +219,7 @@ impl Synth {
     fn overrides(&self) -> Result<Overrides> {
         let overrides = Overrides {
             sky: self.scene,
-            place: self.place,
+            setting: self.place,
             sun_elevation: self.sun_elevation,
             sun_azimuth: self.sun_azimuth,
             turbidity: self.turbidity,
