@@ -48,7 +48,7 @@ impl ProgressBars {
         }
     }
 
-    /// So many more are.
+    /// This many more units are done.
     pub(crate) fn add(&self, units: u64) {
         if let Some(work) = self.current().as_mut() {
             work.advance(work.done + units, "");
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_done_never_becomes_less_and_new_work_begins_anew() {
+    fn what_is_done_never_becomes_less_and_new_work_begins_at_zero() {
         let progress = ProgressBars::new(Report::new(false, true));
         let done = || progress.current().as_ref().map(|work| work.done);
         progress.advance(3, "");

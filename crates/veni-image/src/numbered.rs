@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::{Error, Result};
 
-/// More parts than this are no text of ours.
+/// More parts than this were not written by this crate.
 const MAX_PARTS: usize = 1 << 16;
 
 /// The attributes in the order of their names, each value in parts of at most `limit(name)` bytes, name as it is written.

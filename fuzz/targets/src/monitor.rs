@@ -104,7 +104,7 @@ impl Tally {
     }
 }
 
-/// The process's largest resident size begins anew (Linux).
+/// The process's largest resident size is reset (Linux).
 fn reset_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }

@@ -20,7 +20,7 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
         let size = subject.training_panoramas().ok_or_else(|| {
             Error::invalid(format!(
                 "{}: its file does not say on how many panoramas it was trained; leave this model out, or train it \
-                 anew: a training run records it",
+                 again: a training run records it",
                 subject.name()
             ))
         })?;

@@ -68,7 +68,7 @@ impl Method {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plateau {
-    /// So many updates without an improvement end the fit.
+    /// The number of updates without an improvement that ends the fit.
     pub patience: u64,
     /// A loss counts as better if it is below the best so far by this fraction of it.
     pub improvement: f64,

@@ -19,7 +19,7 @@ pub struct GpuHarmonics {
 }
 
 impl GpuHarmonics {
-    /// For so many latents.
+    /// The number of latents it is for.
     pub fn len(&self) -> u32 {
         self.count
     }

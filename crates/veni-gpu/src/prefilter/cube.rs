@@ -50,7 +50,7 @@ impl<'a> PrefilteredCube<'a> {
             return Err(Error::invalid(format!("a rotation by {}: it must be finite", self.rotation)));
         }
         let count = self.texture.mip_level_count() as usize;
-        let Grid::Cube { size } = grid else { return Err(Error::invalid("a texture that is no cube")) };
+        let Grid::Cube { size } = grid else { return Err(Error::invalid("the texture is not a cube")) };
         Ok((Levels::new(size as usize, count, self.law), format))
     }
 }

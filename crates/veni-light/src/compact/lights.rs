@@ -130,7 +130,7 @@ impl Lights {
         Self::new(sun.filter(seen), others)
     }
 
-    /// Refuses what is no light.
+    /// Refuses what is not a light.
     ///
     /// # Errors
     /// [`Error`] of kind `Invalid` naming the first light whose direction is not a unit vector, whose irradiance is negative or not

@@ -9,7 +9,7 @@ use super::single::Single;
 use crate::sphere::Equirect;
 use crate::tasks;
 
-/// So many directions are faster one by one than as a block with idle lanes.
+/// Up to this many directions are faster one by one than as a block with idle lanes.
 const FEW: usize = 6;
 /// Directions of one task: a few blocks, so that all cores finish together.
 pub(super) const TASK: usize = 192;

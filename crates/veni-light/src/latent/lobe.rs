@@ -44,7 +44,7 @@ impl Lobe {
         self
     }
 
-    /// Refuses what is no lobe.
+    /// Refuses what is not a lobe.
     pub(super) fn check(lobes: &[Self]) -> Result<()> {
         if lobes.len() > MAX_LOBES {
             return Err(Error::too_large(format!("{} lobes, at most {MAX_LOBES} are taken", lobes.len())));

@@ -43,13 +43,13 @@ pub struct Light {
 /// How lights are separated from the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightOptions {
-    /// So many lights are kept at most, the sun first; up to eight. Whether there is a sun, and what it is, does not depend on it.
+    /// The most lights that are kept, the sun first; up to eight. Whether there is a sun, and what it is, does not depend on it.
     pub lights: usize,
     /// Lights of a larger angular radius, radians, stay in the map.
     pub widest: f32,
     /// A light's least share of the light on a surface that faces it.
     pub share: f32,
-    /// A light's peak is so many times brighter than what surrounds it.
+    /// How many times brighter a light's peak is than what surrounds it.
     pub contrast: f32,
     /// Which light is the sun.
     pub sun: SunChoice,
@@ -71,7 +71,7 @@ impl Default for LightOptions {
 }
 
 impl LightOptions {
-    /// The most lights that are taken out; so many are always looked for.
+    /// The most lights that are taken out, and the number that is always looked for.
     pub const MOST: usize = Lights::MOST;
 
     /// The light of row-major `pixels`, which become the residual: no copy is made.

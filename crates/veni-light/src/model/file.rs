@@ -28,7 +28,7 @@ impl Model {
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be read; [`Error::TooLarge`] beyond a limit of [`crate::limits`];
-    /// [`Error::Invalid`] if it is no safetensors, has no `veni` header, or fails a check of [`Model::new`]; [`Error::Unsupported`] for
+    /// [`Error::Invalid`] if it is not a safetensors file, has no `veni` header, or fails a check of [`Model::new`]; [`Error::Unsupported`] for
     /// an unknown format, frame or stored type.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();

@@ -64,7 +64,7 @@ impl Trainer {
         self.make_folders()?;
         let checkpoint = self.checkpoint_path();
         if self.initialised.is_some() {
-            // to go on from here the model will not be needed again
+            // to resume from here the model will not be needed again
             checkpoint::save(&checkpoint, &self.optimiser.state(), &CheckpointInfo::new(0, None))?;
         } else if checkpoint.exists() {
             fs::remove_file(&checkpoint).map_err(|e| Error::io(&checkpoint, "remove", e))?;

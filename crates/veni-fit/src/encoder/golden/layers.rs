@@ -277,7 +277,7 @@ fn a_perturbed_weight_is_noticed() {
             let largest = values.iter().fold(1f32, |m, v| m.max(v.abs()));
             let middle = values.len() / 2;
             values[middle] += 1e-3 * largest;
-            compute(&case).expect("a layer of ours");
+            compute(&case).expect("a layer that is known");
             assert!(!super::failures(&case).is_empty(), "{name}: {key} does not matter");
         }
     }

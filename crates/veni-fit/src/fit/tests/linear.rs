@@ -186,7 +186,7 @@ fn what_is_no_light_is_refused() {
     said(empty().harmonics(&[[1.0; 3]]).unwrap().harmonics(&[[1.0; 3]]), &["once"]);
     let lit = |normal: [f32; 3], e: f64| empty().surfaces(&[(normal, Received::Illuminance(e))]);
     said(empty().surfaces(&[]), &["at least one"]);
-    said(lit([0.0; 3], 1.0), &["surface 0", "no direction"]);
+    said(lit([0.0; 3], 1.0), &["surface 0", "not a direction"]);
     said(lit(WAYS[0], -1.0), &["surface 0", "-1", "not negative"]);
     said(lit(WAYS[0], 0.0), &["all of the light is 0"]);
     said(lit(WAYS[0], 1.0).unwrap().surfaces(&[(WAYS[1], Received::Illuminance(1.0))]), &["once"]);

@@ -125,7 +125,7 @@ fn others(found: &[VeniLightSample], expected: impl Fn(usize) -> VeniLightSample
     found.iter().enumerate().filter(|(k, a)| differ((*k, a))).count()
 }
 
-/// Of 4096 samples so many may fall on the other side of a comparison of rounded numbers.
+/// How many of 4096 samples may fall on the other side of a comparison of rounded numbers.
 const FEW: usize = 4;
 
 /// Runs `body` for each input, which writes two vec4f; `text` is the functions'.

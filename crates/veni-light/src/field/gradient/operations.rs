@@ -1,4 +1,4 @@
-//! The steps of a layer that are no matrix product, forward and backward, over blocks. MODEL (38).
+//! The steps of a layer that are not matrix products, forward and backward, over blocks. MODEL (38).
 
 use std::f32::consts::TAU;
 

@@ -116,7 +116,7 @@ impl<'a> Prefilter<'a> {
 /// # Panics
 /// Unless `p` is in (0, 1].
 pub fn lobe_gains(p: f64, degree: usize) -> Vec<f64> {
-    assert!(p > 0.0 && p <= 1.0, "a level of roughness {p} is no convolution");
+    assert!(p > 0.0 && p <= 1.0, "a level of roughness {p} is not a convolution");
     Lobe::new(p * p).gains(degree, TOLERANCE)
 }
 
