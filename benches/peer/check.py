@@ -1,10 +1,10 @@
-"""Shows that both graphs compute what this project and the authors' program compute, before anything is timed.
+"""Shows that both graphs compute what this project and the reference implementation compute, before anything is timed.
 
     python benches/peer/check.py [--veni-cli BINARY] [--record PRESET FILE]
 
 1. The graphs agree with each other: losses and the gradient of every weight, in f64 and f32, in both forms, with the
    weights of the shipped model.
-2. The graphs agree with the authors' recorded numbers (tests/golden): encoder, decoder, losses, three training steps.
+2. The graphs agree with the recorded numbers of the reference implementation (tests/golden): encoder, decoder, losses, three training steps.
 3. `--veni-cli`: the decoder agrees with what `veni-cli bake` writes.
 4. `--record`: losses and gradients agree with those of a step of ours, as the example `train_step` wrote them.
 5. Deliberate breaks are seen.
@@ -64,17 +64,17 @@ def each_other(report):
                 found[name, kind] = step(graph(sizes, ours, kind), sizes, batch, kind)
         exact = found["folded", F64]
         for part, index in (("losses", 0), ("gradients", 1)):
-            error = difference(found["authors", F64][index], exact[index])
-            report.within(f"{form}, f64: {part} of the authors' graph and of the folded", error, 1e-9)
+            error = difference(found["reference", F64][index], exact[index])
+            report.within(f"{form}, f64: {part} of the reference graph and of the folded", error, 1e-9)
             for name in GRAPHS:
                 error = difference(found[name, torch.float32][index], exact[index])
                 report.within(f"{form}: {part} of the graph {name} in f32 and in f64", error, 1e-3 if index else 1e-4)
     # breaks: a weight, and the form
     bent = {**ours, "encoder.cls": ours["encoder.cls"] + 1e-3}
-    error = difference(step(GRAPHS["authors"](sizes, bent, F64), sizes, batch, F64)[0], exact[0])
+    error = difference(step(GRAPHS["reference"](sizes, bent, F64), sizes, batch, F64)[0], exact[0])
     report.beyond("a class token that is 0.001 off", error, 1e-9)
     other = model_sizes(MODEL)[1]
-    error = difference(step(GRAPHS["authors"](replace(sizes, form=other.form), ours, F64), sizes, batch, F64)[0], exact[0])
+    error = difference(step(GRAPHS["reference"](replace(sizes, form=other.form), ours, F64), sizes, batch, F64)[0], exact[0])
     report.beyond("VN-ReLUs of the other form", error, 1e-9)
 
 

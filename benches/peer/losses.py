@@ -1,4 +1,4 @@
-"""The training losses on log radiance [B, H, W, 3], in the form of the paper and in that of the authors' program."""
+"""The training losses on log radiance [B, H, W, 3], in the form of the paper and in that of the reference implementation."""
 
 import math
 
@@ -7,7 +7,7 @@ from torch.nn import functional as F
 
 # Scharr's derivatives along a row and along a column
 SCHARR = torch.tensor([[[-3.0, 0, 3], [-10, 0, 10], [-3, 0, 3]], [[-3, -10, -3], [0, 0, 0], [3, 10, 3]]])
-# the authors' pair, whose second entry sums to 20
+# the reference implementation's pair, whose second entry sums to 20
 REFERENCE = torch.tensor([[[-3.0, 0, 3], [-10, 0, 10], [-3, 0, 3]], [[-3, 10, -3], [0, 0, 0], [3, 10, 3]]])
 
 
@@ -64,7 +64,7 @@ class Corrected:
 
 
 class Reference:
-    """As the authors' program computes them: mask min(sin(πr/(H − 1)) + 0.001, 1) inside every term."""
+    """As the reference implementation computes them: mask min(sin(πr/(H − 1)) + 0.001, 1) inside every term."""
 
     def __init__(self, sizes, kind):
         height, _ = sizes.loss_size

@@ -51,7 +51,10 @@ fn mixed_precision_trains_where_the_processor_has_it() {
         assert!(said.contains("--mixed-precision"), "{said}");
     } else {
         assert_eq!((run.code, run.out.as_str(), run.err.lines().count()), (Some(2), "", 1), "{run:?}");
-        assert!(run.err.contains("kernels-bfloat16") && run.err.contains("decoder_backend = kernels"), "{run:?}");
+        assert!(
+            run.err.contains("kernels-bfloat16") && run.err.contains("decoder_backend = kernels"),
+            "{run:?}"
+        );
         assert!(dir.files().is_empty(), "{:?}", dir.files());
     }
     let run = dir.run(&[args(&data, "other", "wgpu"), vec!["--mixed-precision"]].concat());

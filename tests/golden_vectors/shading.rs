@@ -5,8 +5,8 @@ use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared, Outcome::Elsewhere, Outcome::Skipped, double, field};
 use burn::tensor::{Device, Tensor};
 use veni::shade::{
-    Camera, Colour, ExposureForm, Lights, Material, RenderedImage, RenderingLoss, ShadingForm, Specular, Surface,
-    Transfer,
+    Camera, Colour, ExposureForm, Lights, Material, RenderedImage, RenderingLoss, ShadingForm, Specular,
+    Surface, Transfer,
 };
 use veni::sphere::{Equirect, reference};
 
@@ -118,7 +118,7 @@ fn shaders(case: &Case) {
 /// The surface of a case, from its normals, its mask and these rays.
 fn surface(case: &Case, rays: &str) -> Surface {
     let size = case.size("S").expect("the size S of the image");
-    // the camera of the authors gives these rays
+    // the camera of the reference implementation gives these rays
     compare(case, rays, &Camera::reference().rays(size, size));
     let mask: Vec<bool> = case.data("in.mask").values.iter().map(|v| *v != 0.0).collect();
     let normals = triples(case, "in.normals");

@@ -135,7 +135,7 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// The authors' line sampling, rotated by each image's yaw: directions and colours [B, T, P, 3].
+    /// The reference implementation's line sampling, rotated by each image's yaw: directions and colours [B, T, P, 3].
     fn samples(&self, yaws: &[f32], device: &Device) -> (Tensor<4>, Tensor<4>) {
         let [t, p] = self.stripes;
         let stripes = Stripes::new(t, p, StripeSampling::Reference).unwrap_or_else(|e| panic!("{e}"));

@@ -5,8 +5,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use veni_fit::shade::{
-    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm, Surface,
-    Transfer,
+    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm,
+    Surface, Transfer,
 };
 use veni_light::sphere::Equirect;
 

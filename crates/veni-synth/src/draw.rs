@@ -10,7 +10,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::random::{Draw, Part};
-use super::scene::{Moon, Setting, Scene, SkyKind};
+use super::scene::{Moon, Scene, Setting, SkyKind};
 use super::view::sun_in_view;
 use clouds::clouds;
 use land::{ground, ridges};
@@ -98,8 +98,10 @@ impl Scene {
         let turbidity = (if sky == SkyKind::Overcast { 4.0 } else { 2.45 } * haze).clamp(1.7, 9.0);
         let clouds = clouds(draw, sky, overrides.cloud_cover);
         let moon = moon(draw, sun_elevation);
-        let settled =
-            matches!(setting, Setting::Street | Setting::Square | Setting::Courtyard | Setting::Village | Setting::Park);
+        let settled = matches!(
+            setting,
+            Setting::Street | Setting::Square | Setting::Courtyard | Setting::Village | Setting::Park
+        );
         let glow = draw.log_range(5e-7, 2e-4) * if settled { 3.0 } else { 0.5 };
         let warm = draw.range(0.0, 1.0);
         let mut ground = ground(draw, setting);

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 
 use super::material::Material;
 use super::random::{Draw, Part};
-use super::scene::{Setting, Scene};
+use super::scene::{Scene, Setting};
 use super::solid::{Shape, Solid};
 
 /// Leaves overhead, as a layer with holes.

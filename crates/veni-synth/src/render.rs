@@ -52,7 +52,13 @@ fn sample(view: &SceneView<'_>, grid: Equirect, column: usize, row: usize) -> Ve
 }
 
 /// Calls `take` with the radiance of n × n samples spread over a pixel, each at random in its own cell.
-fn visit(view: &SceneView<'_>, grid: Equirect, [column, row]: [usize; 2], n: usize, mut take: impl FnMut(Vec3)) {
+fn visit(
+    view: &SceneView<'_>,
+    grid: Equirect,
+    [column, row]: [usize; 2],
+    n: usize,
+    mut take: impl FnMut(Vec3),
+) {
     let footprint = PI / grid.height as f32 / n as f32;
     for k in 0..n * n {
         let key = (row * grid.width + column) as i32;

@@ -146,7 +146,8 @@ fn every_place_shows_as_much_sky_as_its_name_says() {
         Setting::Forest => (0.0..0.1, 0.0),
     };
     for setting in Setting::ALL {
-        let overrides = Overrides { sky: Some(SkyKind::Cloudy), setting: Some(setting), ..Overrides::default() };
+        let overrides =
+            Overrides { sky: Some(SkyKind::Cloudy), setting: Some(setting), ..Overrides::default() };
         let shares: [f32; 24] = std::array::from_fn(|index| {
             let scene = Scene::draw(32, index as u64, &overrides);
             let view = scene_view::SceneView::new(&scene);
@@ -261,7 +262,8 @@ fn the_sun_is_where_it_was_asked_for_with_its_energy_at_any_size() {
 
 #[test]
 fn a_hidden_sun_is_moved_to_where_it_is_in_view() {
-    let clear = Overrides { setting: Some(Setting::Square), sky: Some(SkyKind::Clear), ..Overrides::default() };
+    let clear =
+        Overrides { setting: Some(Setting::Square), sky: Some(SkyKind::Clear), ..Overrides::default() };
     let in_view = |s: &Scene| scene_view::SceneView::new(s).is_clear(s.sun_direction(), f32::INFINITY);
     let mut moved = 0;
     for index in 0..40 {

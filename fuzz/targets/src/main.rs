@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use veni_fuzz_targets::mutate::Mutator;
 use veni_fuzz_targets::monitor::{Clock, Tally, note_panics};
+use veni_fuzz_targets::mutate::Mutator;
 use veni_fuzz_targets::{Target, corpus, target, targets};
 
 fn main() {

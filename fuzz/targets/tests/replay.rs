@@ -5,8 +5,8 @@
 
 use std::time::{Duration, Instant};
 
-use veni_fuzz_targets::mutate::Mutator;
 use veni_fuzz_targets::monitor::{Clock, LONGEST, Tally, note_panics};
+use veni_fuzz_targets::mutate::Mutator;
 use veni_fuzz_targets::{PIXELS, Target, corpus, on_disk, targets};
 
 /// Mutations of each target, and the time after which a slow machine runs fewer.

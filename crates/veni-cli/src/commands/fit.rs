@@ -5,8 +5,8 @@ mod input;
 mod integrals;
 mod lit;
 mod model;
-mod settings;
 mod rendered;
+mod settings;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -35,8 +35,8 @@ pub(crate) use input::Input;
 use integrals::Integrals;
 use lit::{Lit, LitArgs};
 use model::FitModel;
-use settings::{Settings, Start};
 use rendered::Rendered;
+use settings::{Settings, Start};
 
 /// Find the latent of a panorama, a part of one, a photograph, the light on a surface, or harmonics of light
 #[derive(Args, Debug)]

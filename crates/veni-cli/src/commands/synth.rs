@@ -15,7 +15,7 @@ use veni_image::tonemap::Tonemap;
 use veni_image::{Panorama, Precision};
 use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
-use veni_synth::{Overrides, Setting, Scene, SkyKind, generate};
+use veni_synth::{Overrides, Scene, Setting, SkyKind, generate};
 
 use crate::args::Force;
 use crate::features::{LEARN, only};

@@ -51,7 +51,8 @@ impl Train {
                 }
             ));
         }
-        let stop = interrupt::handle("stopping after this step and writing a checkpoint (again: end at once)");
+        let stop =
+            interrupt::handle("stopping after this step and writing a checkpoint (again: end at once)");
         let progress = ProgressBars::new(report);
         let finish = trainer.run(stop, &mut &progress).map_err(with_remedy)?;
         progress.end();

@@ -37,7 +37,11 @@ impl Progress for &ProgressBars {
     fn step(&mut self, step: &StepReport, _remaining: f64) {
         let parts: Vec<_> = step.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
         let stage = step.stage.as_ref().map(|stage| format!("{stage}, ")).unwrap_or_default();
-        ProgressBars::advance(self, step.step, &format!("{stage}loss {:.4} ({})", step.loss, parts.join(", ")));
+        ProgressBars::advance(
+            self,
+            step.step,
+            &format!("{stage}loss {:.4} ({})", step.loss, parts.join(", ")),
+        );
     }
 
     fn validation(&mut self, report: &ValidationReport) {

@@ -6,8 +6,8 @@ use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
 use super::shade::{
-    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm, Surface,
-    Transfer,
+    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm,
+    Surface, Transfer,
 };
 use super::*;
 use crate::train::loss::LossConfig;

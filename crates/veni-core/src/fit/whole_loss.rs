@@ -51,7 +51,8 @@ impl WholeLoss {
                     irradiance,
                     ..
                 } = losses;
-                let weights = [mage, scale_invariant, exposure, cosine, log_mse, hdr_mse, ldr_mse, irradiance];
+                let weights =
+                    [mage, scale_invariant, exposure, cosine, log_mse, hdr_mse, ldr_mse, irradiance];
                 if weights.iter().all(|w| w.at(0) == 0.0) {
                     return Err(Error::invalid("the objective terms has no weight above 0 to begin with"));
                 }

@@ -168,7 +168,11 @@ impl Unpacked {
             whole: ratio(zonal + around, self.whole, other.whole),
             around: ratio(around, self.around, other.around),
             // columns run against the azimuth
-            rotation: if rotation <= std::f32::consts::PI { -rotation } else { std::f32::consts::TAU - rotation },
+            rotation: if rotation <= std::f32::consts::PI {
+                -rotation
+            } else {
+                std::f32::consts::TAU - rotation
+            },
             mirrored,
         }
     }

@@ -80,8 +80,9 @@ fn the_bound_spares_comparisons_and_loses_none() {
 #[test]
 fn captures_and_copies_are_joined_through_each_other() {
     let originals = panoramas();
-    let prints: Vec<_> =
-        [&originals[0], &originals[1], &originals[0].rotated(1.0), &originals[2]].map(Fingerprint::new).into();
+    let prints: Vec<_> = [&originals[0], &originals[1], &originals[0].rotated(1.0), &originals[2]]
+        .map(Fingerprint::new)
+        .into();
     let members: Vec<_> = (["b", "a", "c", "c"].into_iter().zip(&prints))
         .map(|(capture, fingerprint)| Member { capture, fingerprint })
         .collect();

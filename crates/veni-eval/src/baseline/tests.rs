@@ -75,7 +75,8 @@ fn harmonics_are_their_own_best_fit_whatever_the_grid() {
 fn a_rotated_image_has_the_rotated_fit() {
     let grid = Equirect::new(32, 16);
     let image = sky(grid);
-    let rotated: Vec<f32> = image.chunks_exact(96).flat_map(|row| [&row[15..], &row[..15]].concat()).collect();
+    let rotated: Vec<f32> =
+        image.chunks_exact(96).flat_map(|row| [&row[15..], &row[..15]].concat()).collect();
     for space in [Space::Log, Space::Linear] {
         let baseline = Baseline::SphericalHarmonics { order: 4, space };
         let [a, b] =

@@ -31,7 +31,11 @@ impl Sheet {
         let letters = grid.width / LETTER[0] as usize;
         for (column, title) in columns.iter().enumerate() {
             let [x, _] = sheet.corner(column, 0);
-            sheet.canvas.text(&shortened(title, letters), [(x + grid.width / 2) as i32, 10], Alignment::Center);
+            sheet.canvas.text(
+                &shortened(title, letters),
+                [(x + grid.width / 2) as i32, 10],
+                Alignment::Center,
+            );
         }
         for (row, name) in rows.iter().enumerate() {
             let [_, y] = sheet.corner(0, row);

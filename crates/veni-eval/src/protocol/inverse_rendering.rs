@@ -19,8 +19,8 @@ use veni_core::LoadedModel;
 use veni_core::fit::{FitConfig, FitResult, fit_rendered, matching_exposure};
 use veni_data::Item;
 use veni_fit::shade::{
-    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm, Surface,
-    Transfer,
+    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm,
+    Surface, Transfer,
 };
 use veni_image::Panorama;
 use veni_image::metrics::{Alignment, psnr};
@@ -207,8 +207,14 @@ fn fitted(subject: &LoadedModel, grid: Equirect, item: &Item, set: Set, ks: f32)
     start.log_exposure = matching_exposure(&image, &picture, dark.as_chunks().0);
     let config = FitConfig { prior: PRIOR, free_exposure: true, ..FitConfig::light().in_steps(set.steps) };
     let (images, prior, starts) = ([image], subject.prior(), [start]);
-    let FitResult { latents, last, .. } =
-        fit_rendered(subject.fit_decoder().as_dyn(), &images, Some(&prior), &starts, &config, &mut |_, _| {})?;
+    let FitResult { latents, last, .. } = fit_rendered(
+        subject.fit_decoder().as_dyn(),
+        &images,
+        Some(&prior),
+        &starts,
+        &config,
+        &mut |_, _| {},
+    )?;
     let vectors = latents.into_iter().next().map(|z| z.vectors).unwrap_or_default();
     Ok(Found { vectors, loss: last.into_iter().sum() })
 }

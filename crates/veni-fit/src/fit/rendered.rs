@@ -58,7 +58,8 @@ mod tests {
     use super::super::tests::{decoder, latent};
     use super::*;
     use crate::shade::{
-        Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderingLoss, ShadingForm, Surface, Transfer,
+        Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderingLoss, ShadingForm, Surface,
+        Transfer,
     };
     use veni_light::sphere::Equirect;
 
@@ -92,8 +93,8 @@ mod tests {
         let image = [ball(&truth)];
         let config = FitConfig { prior: 0.0, free_exposure: true, ..FitConfig::light() };
         let none = FitConfig { steps: 0, ..config };
-        let exact =
-            fit_rendered(&decoder, &image, None, std::slice::from_ref(&truth), &none, &mut |_, _| {}).unwrap();
+        let exact = fit_rendered(&decoder, &image, None, std::slice::from_ref(&truth), &none, &mut |_, _| {})
+            .unwrap();
         assert!(exact.last[0] < 1e-9, "{}", exact.last[0]);
         let mut near = truth;
         near.vectors.as_flattened_mut().iter_mut().for_each(|v| *v += 0.05);

@@ -78,7 +78,7 @@ impl NormalMap {
         self
     }
 
-    /// Another size, bilinearly between pixel centres, without averaging where the map shrinks: what the authors do.
+    /// Another size, bilinearly between pixel centres, without averaging where the map shrinks: what the reference implementation does.
     /// Normals of an edge become too short to be [valid](Self::valid).
     #[must_use]
     pub fn resize(&self, width: usize, height: usize) -> Self {

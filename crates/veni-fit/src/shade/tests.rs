@@ -224,8 +224,9 @@ fn what_does_not_fit_together_is_refused() {
     let white = Material::lambert(Colour::Uniform([1.0; 3]));
     let transfer =
         Transfer::new(&surface, &white, Lights::icosahedron(12, false), ShadingForm::Physical).unwrap();
-    let message =
-        |target: &[[f32; 3]], loss| RenderedImage::new(transfer.clone(), target, loss).unwrap_err().to_string();
+    let message = |target: &[[f32; 3]], loss| {
+        RenderedImage::new(transfer.clone(), target, loss).unwrap_err().to_string()
+    };
     assert!(message(&[[1.0; 3]; 9], RenderingLoss::default()).contains("9 pixels, the surface 8 × 8"));
     assert!(message(&[[f32::NAN; 3]; 64], RenderingLoss::default()).contains("finite"));
     for loss in [RenderingLoss::default(), RenderingLoss::ReferenceLog] {

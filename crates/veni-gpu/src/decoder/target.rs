@@ -85,7 +85,9 @@ impl<'a> Bake<'a> {
     pub(super) fn request(&self, latents: u32) -> Result<(Directions, Store, Request)> {
         if !self.rotation.is_finite() || !self.stops.is_finite() {
             let (rotation, stops) = (self.rotation, self.stops);
-            return Err(Error::invalid(format!("a rotation by {rotation} and {stops} stops: both must be finite")));
+            return Err(Error::invalid(format!(
+                "a rotation by {rotation} and {stops} stops: both must be finite"
+            )));
         }
         let (directions, store, grid, first, count) = match self.target {
             Target::Texture { texture, cube } => {

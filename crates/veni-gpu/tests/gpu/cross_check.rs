@@ -120,8 +120,11 @@ fn cube_faces_and_lists_in_every_frame() {
         field.log_radiance_batch(&native, &mut expected);
         let pixels = gpu.pixels(native.len());
         let grid = Grid::Cube { size: size as u32 };
-        let bake =
-            Bake::rows(&pixels, grid, 0..6 * size as u32).frame(frame).rotate(angle).brighten(0.5).logarithm();
+        let bake = Bake::rows(&pixels, grid, 0..6 * size as u32)
+            .frame(frame)
+            .rotate(angle)
+            .brighten(0.5)
+            .logarithm();
         gpu.bake(&decoder, &latents, &bake);
         let off = difference(&gpu.read(&pixels), &expected);
         assert!(agrees(off), "cube in {frame:?}: {off:?}");

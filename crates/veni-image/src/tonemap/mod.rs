@@ -5,7 +5,7 @@
 
 mod srgb;
 
-pub use srgb::{srgb, srgb_of_log, srgb_derivative, srgb_to_linear};
+pub use srgb::{srgb, srgb_derivative, srgb_of_log, srgb_to_linear};
 
 use super::Panorama;
 

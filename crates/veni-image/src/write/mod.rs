@@ -31,7 +31,11 @@ const RESERVED: [&str; 3] = [RADIANCE_SCALE, PIXEL_DIGEST, exr::COLOUR_SPACE];
 
 /// The attributes of `options` in parts of at most `limit(name)` bytes, and where there are any, or `factor` changes the
 /// values, a place for the digest of the pixels.
-fn texts(options: &WriteOptions, factor: f32, limit: impl Fn(&str) -> usize) -> Result<Vec<(String, String)>> {
+fn texts(
+    options: &WriteOptions,
+    factor: f32,
+    limit: impl Fn(&str) -> usize,
+) -> Result<Vec<(String, String)>> {
     let mut all = options.attributes.clone();
     if let Some(name) = all.keys().find(|name| RESERVED.contains(&name.as_str())) {
         return Err(Error::invalid(format!(

@@ -23,11 +23,11 @@ mod luminance;
 mod prefilter;
 mod quadrature;
 mod reduce;
+mod rotate;
 mod sampler;
 pub mod sh;
 #[cfg(feature = "prefilter")]
 mod spectrum;
-mod rotate;
 mod vector;
 
 pub use crate::compact::{CompactLight, Disc, Kind, Lights, RadiusSource};

@@ -1,7 +1,7 @@
 //! What the ground is, and what stands at the horizon.
 
 use crate::random::Draw;
-use crate::scene::{Setting, Ridge, RidgeKind};
+use crate::scene::{Ridge, RidgeKind, Setting};
 use crate::surface::{Ground, Pattern, Surface};
 
 /// Surfaces by weight.

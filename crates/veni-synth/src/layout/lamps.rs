@@ -55,7 +55,10 @@ impl Builder {
         let level = self.draw.log_range(4e-4, 8e-3);
         let warm = self.draw.unit();
         let colour = Vec3::new(1.7, 0.85, 0.25).lerp(Vec3::new(1.1, 1.0, 0.8), warm);
-        if matches!(setting, Setting::Street | Setting::Square | Setting::Courtyard | Setting::Village | Setting::Park) {
+        if matches!(
+            setting,
+            Setting::Street | Setting::Square | Setting::Courtyard | Setting::Village | Setting::Park
+        ) {
             self.layout.street_light = level * colour;
         }
     }

@@ -187,7 +187,9 @@ fn plants_and_cars_stand_on_the_ground() {
                 // boxes on the ground, on wheels, on a car, on the pillars of a roof; and boulders
                 Shape::Hull { .. } => {
                     let low = extent(&solid.shape).map_or(0.0, |[low, _]| low);
-                    low <= 0.2 || low == 0.9 || scene.setting == Setting::Shelter && (2.6..=6.0).contains(&low)
+                    low <= 0.2
+                        || low == 0.9
+                        || scene.setting == Setting::Shelter && (2.6..=6.0).contains(&low)
                 }
                 Shape::Trunk { .. } => true,
             };

@@ -6,8 +6,8 @@ use anyhow::{Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use veni_fit::matching_exposure;
 use veni_fit::shade::{
-    Camera, Colour, ExposureForm, Lights, Material, NormalMap, RenderedImage, RenderingLoss, ShadingForm, Surface,
-    Transfer, read_albedo, read_mask,
+    Camera, Colour, ExposureForm, Lights, Material, NormalMap, RenderedImage, RenderingLoss, ShadingForm,
+    Surface, Transfer, read_albedo, read_mask,
 };
 use veni_image::Picture;
 use veni_light::Error;
@@ -104,9 +104,12 @@ impl Rendered {
         };
         let grid = Equirect::new(self.lights, self.lights / 2);
         let (lights, form, loss, exposure) = match self.shading {
-            Shading::Physical => {
-                (Lights::equirect(grid), ShadingForm::Physical, RenderingLoss::default(), ExposureForm::Natural)
-            }
+            Shading::Physical => (
+                Lights::equirect(grid),
+                ShadingForm::Physical,
+                RenderingLoss::default(),
+                ExposureForm::Natural,
+            ),
             Shading::Reference => (
                 Lights::new(&grid.directions(), &vec![1.0; grid.len()])?,
                 ShadingForm::Reference,

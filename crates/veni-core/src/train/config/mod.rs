@@ -123,7 +123,8 @@ impl TrainConfig {
     /// [`Error::Invalid`] naming the key and line that do not fit.
     pub fn from_toml(text: &str) -> Result<Self> {
         let mut config: Self = toml::from_str(text).map_err(|e| Error::invalid(e.to_string()))?;
-        let named = |table: toml::Table| ["decoder_backend", "decoder_by"].iter().any(|key| table.contains_key(*key));
+        let named =
+            |table: toml::Table| ["decoder_backend", "decoder_by"].iter().any(|key| table.contains_key(*key));
         if toml::from_str(text).is_ok_and(|table| !named(table)) {
             config.decoder_backend = config.device.decoder_backend();
         }

@@ -258,7 +258,7 @@ fn transformer(case: &Case, layer: VectorLayer) -> Result<(), Skipped> {
 }
 
 #[test]
-fn layers_of_the_authors() {
+fn layers_of_the_reference() {
     let (passed, skipped) = run(&names(&["c01_", "c02_"]), compute);
     assert_eq!(passed.len(), 22, "{passed:#?} skipped: {skipped:#?}");
     assert_eq!(skipped.len(), 6, "{skipped:#?}");

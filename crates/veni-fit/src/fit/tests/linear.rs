@@ -59,7 +59,11 @@ fn the_gradient_is_the_difference_and_both_ways_to_it_agree() {
             target.with_gradient(&at).0
         };
         let difference = (moved(1e-4) - moved(-1e-4)) / 2e-4;
-        assert!((difference - gradient[k]).abs() < 1e-6 * difference.abs() + 1e-12, "{k}: {difference} {}", gradient[k]);
+        assert!(
+            (difference - gradient[k]).abs() < 1e-6 * difference.abs() + 1e-12,
+            "{k}: {difference} {}",
+            gradient[k]
+        );
     }
     // through the decoder: the Jacobian of the moments, and a pass backward
     let (decoder, light) = (decoder(), lit(2));

@@ -152,7 +152,8 @@ fn gradients_are_those_of_the_pixel_losses() {
                     continue;
                 }
                 // the parabola lies above an absolute error, and is a squared error itself
-                let parabola = |d: f64| loss.at(pixel, p).loss + gradient[c] * d + 0.5 * gauss_newton[c] * d * d;
+                let parabola =
+                    |d: f64| loss.at(pixel, p).loss + gradient[c] * d + 0.5 * gauss_newton[c] * d * d;
                 for over in [-1.0, -0.1, 0.1, 1.0].map(|d| parabola(d) - moved(d)) {
                     match objective {
                         Objective::LogAbsolute => assert!(over > -1e-9, "{pixel}, {c}: {over}"),

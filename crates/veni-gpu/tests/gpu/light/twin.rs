@@ -35,8 +35,10 @@ fn the_twin_is_the_cpus_sampler() {
 fn the_twins_irradiance_is_that_of_lights_and_harmonics() {
     for sky in skies() {
         let rotated = sky.light.rotated(0.7);
-        let (twin, sh) =
-            (LightTwin::new(sky.packed()).rotated(0.7), sky.light.residual_sh().rotated_about_z(0.7).irradiance());
+        let (twin, sh) = (
+            LightTwin::new(sky.packed()).rotated(0.7),
+            sky.light.residual_sh().rotated_about_z(0.7).irradiance(),
+        );
         let (mut worst, mut off, mut whole) = (0f32, 0f64, 0f64);
         let scale = sky.light.mean().into_iter().fold(1e-6, f32::max) * std::f32::consts::PI;
         for n in directions(500) {

@@ -107,7 +107,8 @@ fn at_latent_zero_everything_is_finite_and_rotating_rotates_the_gradient() {
         [x * cos - y * sin, x * sin + y * cos, z]
     };
     let rotated: Vec<_> = directions.iter().map(|d| rotate(*d)).collect();
-    let (one, two) = (gradient(&model, &latent, &directions), gradient(&model, &latent.rotated(0.8), &rotated));
+    let (one, two) =
+        (gradient(&model, &latent, &directions), gradient(&model, &latent.rotated(0.8), &rotated));
     let scale = one.vectors.as_flattened().iter().fold(0.0f32, |m, v| m.max(v.abs()));
     for (a, b) in one.vectors.iter().zip(&two.vectors) {
         let a = rotate(*a);

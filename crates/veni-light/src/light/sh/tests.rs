@@ -180,7 +180,11 @@ fn rotations_are_those_of_the_picture() {
         row.rotate_left(37);
     }
     let expected = Sh::<8>::of(EnvironmentMap::new(GRID, &rotated).unwrap());
-    assert!(near(&sh.rotated_about_z(angle), &expected) < 1e-6, "{}", near(&sh.rotated_about_z(angle), &expected));
+    assert!(
+        near(&sh.rotated_about_z(angle), &expected) < 1e-6,
+        "{}",
+        near(&sh.rotated_about_z(angle), &expected)
+    );
     assert!(near(&sh.rotated_about_z(-angle), &expected) > 0.01, "the wrong way round must not pass");
     // the same as a matrix, and a tilt there and back
     let (s, c) = (angle.sin() as f32, angle.cos() as f32);

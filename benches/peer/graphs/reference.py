@@ -1,4 +1,4 @@
-"""The authors' graph: everything computed where the paper's formulas put it, for every ray and every token.
+"""The reference graph: everything computed where the paper's formulas put it, for every ray and every token.
 
 Features are [.., channel, coordinate] and maps of channels are einsums. The decoder repeats the latent for every ray:
 invariants, keys, values and the attention over its single key are computed ray by ray. VN-ReLUs apply W and U to the
@@ -14,9 +14,9 @@ from torch.nn import functional as F
 import weights as names
 
 
-class Authors:
+class Reference:
     def __init__(self, sizes, ours, kind=torch.float32):
-        theirs = names.to_authors(ours, sizes)
+        theirs = names.to_reference(ours, sizes)
         self.sizes = sizes
         self.weights = {name: w.to(kind).clone().requires_grad_() for name, w in theirs.items()}
 
@@ -28,7 +28,7 @@ class Authors:
     def gradients(self):
         """By our names. Queries and keys of the decoder are left out; theirs are exactly 0."""
         found = {name: w.grad for name, w in self.weights.items() if w.grad is not None}
-        return names.from_authors(found, self.sizes)
+        return names.from_reference(found, self.sizes)
 
     # ---- encoder ----
 
