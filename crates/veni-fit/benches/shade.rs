@@ -1,5 +1,5 @@
 //! One evaluation of a rendered image, loss and gradient, as a fit does it hundreds of times:
-//! `cargo bench -p veni-core --no-default-features --bench shade`.
+//! `cargo bench -p veni-fit --bench shade`.
 
 use std::hint::black_box;
 

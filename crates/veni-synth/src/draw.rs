@@ -1,7 +1,8 @@
 //! The distribution of scenes.
 //!
 //! Weather, time of day and setting are drawn first, everything else given these. The shares were set by hand so that
-//! statistics of log radiance agree with those of photographed outdoor panoramas (`docs/RESULTS.md`, Synthetic skies).
+//! statistics of log radiance agree with those of photographed outdoor panoramas (docs/results/synthetic.md,
+//! "Photographed and generated scenes").
 
 mod clouds;
 mod land;

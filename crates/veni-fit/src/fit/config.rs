@@ -48,7 +48,7 @@ pub enum Method {
     Auto,
 }
 
-/// [`Objective::Energy`]'s weight by default: docs/results/fitting.md, "A squared energy term".
+/// [`Objective::Energy`]'s weight by default: docs/results/light.md, "The energy weight of a fit".
 const ENERGY_WEIGHT: f64 = 0.05;
 /// Weight of the prior beside integrals of light: it decides what they leave open, and gives way where they do not.
 const LINEAR_PRIOR: f64 = 1e-6;

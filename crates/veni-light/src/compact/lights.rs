@@ -95,8 +95,9 @@ impl Lights {
         self.all.iter().map(of_light).fold(0.0, f32::max)
     }
 
-    /// What each texel of a cube map whose faces are named by `frame` ([`CubeFace::direction`](crate::sphere::CubeFace::direction)) gains from the lights: indices,
-    /// face after face, row-major and ascending for each light, and radiance.
+    /// What each texel of a cube map whose faces are named by `frame`
+    /// ([`CubeFace::direction`](crate::sphere::CubeFace::direction)) gains from the lights: indices, face after face,
+    /// row-major and ascending for each light, and radiance.
     pub fn on_cube(&self, frame: Frame, size: usize) -> Vec<(usize, [f32; 3])> {
         self.all.iter().flat_map(|light| light.on_cube(frame, size)).collect()
     }
