@@ -142,7 +142,7 @@ fn levels_are_the_sum_over_all_pixels() {
             // a lobe that is half a texel off is noticed
             if k == 0 {
                 let mut moved = prefilter.clone();
-                let shifted = light.rotated_about_z((1.0 / levels.size(level) as f64).max(0.02));
+                let shifted = light.rotated((1.0 / levels.size(level) as f64).max(0.02));
                 moved.lights = vec![shifted];
                 let cube = moved.level(p, levels.size(level), CubeAxes::BEVY);
                 let mut sums = (0.0, 0.0);
@@ -212,7 +212,7 @@ fn a_rotation_commutes_with_the_filter() {
         let map = EnvironmentMap::new(grid, pixels).unwrap();
         Prefilter::new(map, &[levels]).with_lights(&[light]).level(0.5, 16, CubeAxes::NATIVE)
     };
-    let (a, b) = (bake(&rotated, light.rotated_about_z(std::f64::consts::FRAC_PI_2)), bake(&pixels, light));
+    let (a, b) = (bake(&rotated, light.rotated(std::f64::consts::FRAC_PI_2)), bake(&pixels, light));
     for (k, texel) in a.texels().iter().enumerate() {
         // seen after a rotation back by 90°
         let [x, y, z] = direction(16, CubeAxes::NATIVE, k);
