@@ -1,4 +1,5 @@
-//! The reference implementation's baselines: spherical harmonics and spherical Gaussians, as fields, of images, and ten steps of a fit.
+//! The reference implementation's baselines: spherical harmonics and spherical Gaussians, as fields, of images, and ten
+//! steps of a fit.
 
 use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared};

@@ -113,8 +113,8 @@ fn compare(case: &Case, official: &Official, device: &Device) {
     official.compare_gradients(case, &encoder, &gradients);
 }
 
-/// The reference implementation's weights on their directions; and on clean directions, without a mirror, the weights they rewrote and
-/// those we rewrite.
+/// The reference implementation's weights on their directions; and on clean directions, without a mirror, the weights
+/// they rewrote and those we rewrite.
 fn import(case: &Case, official: &Official, device: &Device) {
     let colours = images(case.data("in.colors"), true, device);
     let check = |encoder: &Encoder, directions: Tensor<4>| {

@@ -50,8 +50,8 @@ impl GpuLight {
         })
     }
 
-    /// Rotates the scene to `radians` about z, counter-clockwise seen from above, from where it was packed: eight bytes. Takes effect
-    /// for what is submitted after it.
+    /// Rotates the scene to `radians` about z, counter-clockwise seen from above, from where it was packed: eight
+    /// bytes. Takes effect for what is submitted after it.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the angle is not finite; [`Error::Gpu`] if the device fails.

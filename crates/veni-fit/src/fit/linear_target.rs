@@ -78,8 +78,9 @@ impl LinearTarget {
     /// for some degree L.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if there are harmonics or surfaces already, if their number is not a square, if one is not finite, or
-    /// the first one, the mean radiance, is negative or all of it 0; [`Error::TooLarge`] for more than [`MAX_HARMONICS`].
+    /// [`Error::Invalid`] if there are harmonics or surfaces already, if their number is not a square, if one is not
+    /// finite, or the first one, the mean radiance, is negative or all of it 0; [`Error::TooLarge`] for more than
+    /// [`MAX_HARMONICS`].
     pub fn harmonics(mut self, wanted: &[[f64; 3]]) -> Result<Self> {
         if self.count > 0 {
             return Err(Error::invalid("harmonics come first, and once"));

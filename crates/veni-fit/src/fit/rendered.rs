@@ -7,8 +7,8 @@ use crate::{Error, Result};
 use veni_light::latent::{Latent, Prior};
 
 /// Optimises one latent per image from `start`. Each image's loss is its own
-/// ([`RenderingLoss`](crate::shade::RenderingLoss)): [`FitConfig::objective`] is not looked at. All must have the same lights, those the
-/// decoder is asked for. A latent's log exposure is the number that the image's
+/// ([`RenderingLoss`](crate::shade::RenderingLoss)): [`FitConfig::objective`] is not looked at. All must have the same
+/// lights, those the decoder is asked for. A latent's log exposure is the number that the image's
 /// [`ExposureForm`](crate::shade::ExposureForm) takes. `observer` gets the number of updates made and the mean loss.
 ///
 /// # Errors

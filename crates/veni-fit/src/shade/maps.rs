@@ -78,8 +78,8 @@ impl NormalMap {
         self
     }
 
-    /// Another size, bilinearly between pixel centres, without averaging where the map shrinks: what the reference implementation does.
-    /// Normals of an edge become too short to be [valid](Self::valid).
+    /// Another size, bilinearly between pixel centres, without averaging where the map shrinks: what the reference
+    /// implementation does. Normals of an edge become too short to be [valid](Self::valid).
     #[must_use]
     pub fn resize(&self, width: usize, height: usize) -> Self {
         let columns = taps(self.width, width);

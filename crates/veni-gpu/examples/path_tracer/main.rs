@@ -119,8 +119,8 @@ fn sky(opened: &Opened, options: &Options) -> Result<Sky> {
     Ok(Sky { lights, field })
 }
 
-/// The rotation that brings most light to where it suits the scene: the azimuth of the upper half's mean direction, weighted by
-/// luminance.
+/// The rotation that brings most light to where it suits the scene: the azimuth of the upper half's mean direction,
+/// weighted by luminance.
 fn key_rotation(map: EnvironmentMap<'_>) -> f64 {
     let (grid, mut x, mut y) = (map.grid(), 0.0, 0.0);
     for (i, pixel) in map.pixels().iter().take(grid.len() / 2).enumerate() {

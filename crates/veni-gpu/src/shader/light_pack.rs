@@ -32,9 +32,10 @@ pub struct PackedLight {
     pub texels: Vec<[f32; 4]>,
 }
 
-/// Packs a light once; [`LightUniform::rotation_bytes`] rotates it. The sun, if there is one, is drawn as its disc; all else, other
-/// compact lights as discs on pixels, is the map, of at most 2²³ pixels (larger ones are averaged). For a map that is not to be
-/// split, take it with [`LightOptions::lights`](veni_light::light::LightOptions::lights) = 0. A black light is drawn evenly.
+/// Packs a light once; [`LightUniform::rotation_bytes`] rotates it. The sun, if there is one, is drawn as its disc; all
+/// else, other compact lights as discs on pixels, is the map, of at most 2²³ pixels (larger ones are averaged). For a
+/// map that is not to be split, take it with [`LightOptions::lights`](veni_light::light::LightOptions::lights) = 0. A
+/// black light is drawn evenly.
 ///
 /// # Errors
 /// [`Error`] of kind `Invalid` if radiance is so large or small that a density or an irradiance leaves the range of f32.

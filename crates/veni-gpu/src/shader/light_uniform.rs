@@ -45,8 +45,8 @@ impl LightUniform {
     /// Bytes of the uniform.
     pub const BYTES: usize = 464;
 
-    /// The first eight bytes of the uniform for a rotation by `radians` about z, counter-clockwise seen from above: all that is
-    /// written to rotate a light.
+    /// The first eight bytes of the uniform for a rotation by `radians` about z, counter-clockwise seen from above: all
+    /// that is written to rotate a light.
     pub fn rotation_bytes(radians: f64) -> [u8; 8] {
         let (sin, cos) = radians.sin_cos();
         bytes([(sin as f32).to_bits(), (cos as f32).to_bits()])

@@ -1,8 +1,8 @@
 //! The latent code: N vectors in R³ that rotate with the scene, its compact lights, and an exposure. MODEL (2), MODEL (71).
 //!
-//! Rotating a panorama by α about z rotates every vector, light and lobe by α about z; the x and y of a vector form its equivariant
-//! part, z its invariant part. The paper's code is the vectors alone, of dimension D = 3N; a light and a lobe take seven numbers
-//! each.
+//! Rotating a panorama by α about z rotates every vector, light and lobe by α about z; the x and y of a vector form its
+//! equivariant part, z its invariant part. The paper's code is the vectors alone, of dimension D = 3N; a light and a
+//! lobe take seven numbers each.
 
 mod density;
 mod file;

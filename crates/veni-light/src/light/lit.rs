@@ -11,8 +11,9 @@ use crate::field::Field;
 use crate::sphere::Equirect;
 use crate::{Error, Result};
 
-/// What a surface or a lobe of the sun's size needs to know of a panorama: a few compact lights, the sun first, and what is left
-/// without them. Per channel the integral of the whole is that of the rest plus the lights' irradiances, by construction.
+/// What a surface or a lobe of the sun's size needs to know of a panorama: a few compact lights, the sun first, and
+/// what is left without them. Per channel the integral of the whole is that of the rest plus the lights' irradiances,
+/// by construction.
 ///
 /// ```
 /// use veni_light::light::{EnvironmentMap, Light};
@@ -43,7 +44,8 @@ pub struct Light {
 /// How lights are separated from the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightOptions {
-    /// The most lights that are kept, the sun first; up to eight. Whether there is a sun, and what it is, does not depend on it.
+    /// The most lights that are kept, the sun first; up to eight. Whether there is a sun, and what it is, does not
+    /// depend on it.
     pub lights: usize,
     /// Lights of a larger angular radius, radians, stay in the map.
     pub widest: f32,

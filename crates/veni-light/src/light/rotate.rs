@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 use super::lit::Light;
 
 impl Light {
-    /// The same scene rotated by `angle` radians about z, counter-clockwise seen from above. Lights, harmonics and irradiance rotate
-    /// exactly; the residual exactly by whole columns, between them as the mean of two columns by their distance, which keeps
-    /// the energy.
+    /// The same scene rotated by `angle` radians about z, counter-clockwise seen from above. Lights, harmonics and
+    /// irradiance rotate exactly; the residual exactly by whole columns, between them as the mean of two columns by
+    /// their distance, which keeps the energy.
     #[must_use]
     pub fn rotated(&self, angle: f64) -> Self {
         let mut out = self.clone();

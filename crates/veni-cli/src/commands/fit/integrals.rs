@@ -43,7 +43,8 @@ pub(super) struct Integrals {
         "objective", "share", "exposure"])]
     target_irradiance: Option<PathBuf>,
 
-    /// Scale what is found so that a level surface receives this many lux, radiance being in cd/m²; alone, it is a likely light
+    /// Scale what is found so that a level surface receives this many lux, radiance being in cd/m²; alone, it is a
+    /// likely light
     #[arg(long, value_name = "LUX", value_parser = positive)]
     illuminance: Option<f64>,
 }

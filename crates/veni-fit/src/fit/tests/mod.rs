@@ -97,8 +97,8 @@ fn what_does_not_fit_together_is_refused() {
     assert!(message(&[&image], Some(&[&empty]), &[latent(1)]).contains("mask"));
 }
 
-/// One pixel with half of the light gets its area's part of 1 − weight and half of the weight; what a mask hides gets nothing,
-/// whatever stands there.
+/// One pixel with half of the light gets its area's part of 1 − weight and half of the weight; what a mask hides gets
+/// nothing, whatever stands there.
 #[test]
 fn light_deals_out_its_part_of_the_weight() {
     let grid = Equirect::new(4, 2);
