@@ -4,7 +4,7 @@
 
 // A light as `pack_light` packs it: a sun, which is a disc, and a map of everything else.
 //
-//   veni_light         the uniform VeniLight, 464 bytes. Its first eight turn the scene about z; write them to turn it.
+//   veni_light         the uniform VeniLight, 464 bytes. Its first eight rotate the scene about z; write them to rotate it.
 //   veni_light_cells   Walker's alias table, a power of two of cells: the bits of the probability that a cell is its own
 //                      pixel, and the pixel that it is otherwise
 //   veni_light_texels  W x H pixels of the map, row-major from the top: linear Rec. 709 radiance, and the density with
@@ -14,8 +14,8 @@
 // Directions are native unit vectors: z up, the centre of a panorama +x, its left quarter +y.
 
 struct VeniLight {
-    // Sine and cosine of the turn, counter-clockwise seen from above
-    turn: vec2f,
+    // Sine and cosine of the rotation, counter-clockwise seen from above
+    rotation: vec2f,
     // W, H
     size: vec2u,
     // Two directions across the sun's
@@ -36,7 +36,7 @@ struct VeniLight {
     diffuse: array<vec4f, 9>,
 }
 
-// All directions as they are before the turn.
+// All directions as they are before the rotation.
 struct VeniCompactLight {
     direction: vec3f,
     // Angular radius, radians
@@ -94,15 +94,15 @@ fn veni_light_atan2(y: f32, x: f32) -> f32 {
     return select(angle, -angle, (bitcast<u32>(y) & 0x80000000u) != 0u);
 }
 
-// A direction of the packed light, as the turned scene has it.
-fn veni_light_turned(d: vec3f) -> vec3f {
-    let t = veni_light.turn;
+// A direction of the packed light, as the rotated scene has it.
+fn veni_light_rotated(d: vec3f) -> vec3f {
+    let t = veni_light.rotation;
     return vec3f(d.x * t.y - d.y * t.x, d.y * t.y + d.x * t.x, d.z);
 }
 
 // And back.
-fn veni_light_unturned(d: vec3f) -> vec3f {
-    let t = veni_light.turn;
+fn veni_light_unrotated(d: vec3f) -> vec3f {
+    let t = veni_light.rotation;
     return vec3f(d.x * t.y + d.y * t.x, d.y * t.y - d.x * t.x, d.z);
 }
 
@@ -138,7 +138,7 @@ fn veni_sample_light(u: vec2f) -> VeniLightSample {
         inside = veni_light_in_sun(own);
     }
     let both = veni_light_both(texel, inside);
-    return VeniLightSample(veni_light_turned(own), both.w, both.xyz);
+    return VeniLightSample(veni_light_rotated(own), both.w, both.xyz);
 }
 
 // The density with which `veni_sample_light` draws a unit direction, 1/sr.
@@ -153,7 +153,7 @@ fn veni_light_radiance(direction: vec3f) -> vec3f {
 
 // Radiance and density.
 fn veni_light_seen(direction: vec3f) -> vec4f {
-    let own = veni_light_unturned(direction);
+    let own = veni_light_unrotated(direction);
     return veni_light_both(veni_light_texels[veni_light_pixel(own)], veni_light_in_sun(own));
 }
 
@@ -189,7 +189,7 @@ fn veni_light_place(u: vec2f) -> VeniLightPlace {
     return VeniLightPlace(pixel, (vec2f(floor(coarse), fine) + 0.5) / 4096.0);
 }
 
-// The direction of a place before the turn, even in cos(theta); beside a pole by sin^2 of half the angle, since f32 does
+// The direction of a place before the rotation, even in cos(theta); beside a pole by sin^2 of half the angle, since f32 does
 // not hold 1 - cos(theta).
 fn veni_light_direction(place: VeniLightPlace) -> vec3f {
     let size = veni_light.size;
@@ -235,11 +235,11 @@ fn veni_sun(u: vec2f) -> VeniLightSample {
         return VeniLightSample(vec3f(0.0, 0.0, 1.0), 0.0, vec3f());
     }
     let sun = veni_light.compact[0];
-    let direction = veni_light_turned(veni_light_on_sun(u));
+    let direction = veni_light_rotated(veni_light_on_sun(u));
     return VeniLightSample(direction, sun.per_solid_angle, sun.per_solid_angle * sun.irradiance);
 }
 
-// A direction of the disc before the turn, even in solid angle.
+// A direction of the disc before the rotation, even in solid angle.
 fn veni_light_on_sun(u: vec2f) -> vec3f {
     let drop = veni_light.cap * u.x;
     let tilt = sqrt(drop * (2.0 - drop));
@@ -248,7 +248,7 @@ fn veni_light_on_sun(u: vec2f) -> vec3f {
     return normalize((1.0 - drop) * veni_light.compact[0].direction + tilt * away);
 }
 
-// Whether a direction before the turn lies within the disc, by the chord: a cosine near 1 has no digits left.
+// Whether a direction before the rotation lies within the disc, by the chord: a cosine near 1 has no digits left.
 fn veni_light_in_sun(own: vec3f) -> bool {
     let chord = own - veni_light.compact[0].direction;
     return veni_light.has_sun != 0u && 0.5 * dot(chord, chord) <= veni_light.cap;
@@ -258,7 +258,7 @@ fn veni_light_in_sun(own: vec3f) -> bool {
 
 // Irradiance of a surface with this unit normal, by everything above its horizon. Not below 0, as nine harmonics may be.
 fn veni_irradiance(normal: vec3f) -> vec3f {
-    let n = veni_light_unturned(normal);
+    let n = veni_light_unrotated(normal);
     let s = veni_light.diffuse;
     var sum = s[0].xyz + s[1].xyz * n.y + s[2].xyz * n.z + s[3].xyz * n.x;
     sum += s[4].xyz * (n.x * n.y) + s[5].xyz * (n.y * n.z) + s[6].xyz * (3.0 * n.z * n.z - 1.0);

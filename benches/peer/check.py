@@ -1,10 +1,10 @@
-"""Shows that both graphs compute what this project and the authors' program compute, before anything is timed.
+"""Shows that both graphs compute what this project and the reference implementation compute, before anything is timed.
 
     python benches/peer/check.py [--veni-cli BINARY] [--record PRESET FILE]
 
 1. The graphs agree with each other: losses and the gradient of every weight, in f64 and f32, in both forms, with the
    weights of the shipped model.
-2. The graphs agree with the authors' recorded numbers (tests/golden): encoder, decoder, losses, three training steps.
+2. The graphs agree with the recorded numbers of the reference implementation (tests/golden): encoder, decoder, losses, three training steps.
 3. `--veni-cli`: the decoder agrees with what `veni-cli bake` writes.
 4. `--record`: losses and gradients agree with those of a step of ours, as the example `train_step` wrote them.
 5. Deliberate breaks are seen.
@@ -64,17 +64,17 @@ def each_other(report):
                 found[name, kind] = step(graph(sizes, ours, kind), sizes, batch, kind)
         exact = found["folded", F64]
         for part, index in (("losses", 0), ("gradients", 1)):
-            error = difference(found["authors", F64][index], exact[index])
-            report.within(f"{form}, f64: {part} of the authors' graph and of the folded", error, 1e-9)
+            error = difference(found["reference", F64][index], exact[index])
+            report.within(f"{form}, f64: {part} of the reference graph and of the folded", error, 1e-9)
             for name in GRAPHS:
                 error = difference(found[name, torch.float32][index], exact[index])
                 report.within(f"{form}: {part} of the graph {name} in f32 and in f64", error, 1e-3 if index else 1e-4)
     # breaks: a weight, and the form
     bent = {**ours, "encoder.cls": ours["encoder.cls"] + 1e-3}
-    error = difference(step(GRAPHS["authors"](sizes, bent, F64), sizes, batch, F64)[0], exact[0])
+    error = difference(step(GRAPHS["reference"](sizes, bent, F64), sizes, batch, F64)[0], exact[0])
     report.beyond("a class token that is 0.001 off", error, 1e-9)
     other = model_sizes(MODEL)[1]
-    error = difference(step(GRAPHS["authors"](replace(sizes, form=other.form), ours, F64), sizes, batch, F64)[0], exact[0])
+    error = difference(step(GRAPHS["reference"](replace(sizes, form=other.form), ours, F64), sizes, batch, F64)[0], exact[0])
     report.beyond("VN-ReLUs of the other form", error, 1e-9)
 
 
@@ -109,11 +109,11 @@ def recorded(report, preset, path):
     def part(prefix):
         return {k.removeprefix(prefix): v for k, v in tensors.items() if k.startswith(prefix)}
 
-    batch, ours, values, slopes = part("batch."), part("weight."), part("loss."), part("gradient.")
+    batch, ours, values, given = part("batch."), part("weight."), part("loss."), part("gradient.")
     sizes = presets.of(preset, batch["noise"].shape[1])
     batch = training.Batch(*(batch[k] for k in ("directions", "log_radiance", "loss_directions", "target", "noise")))
     # what the loss does not depend on has no gradient there
-    slopes = {name: slopes.get(name, torch.zeros_like(w)) for name, w in ours.items()}
+    given = {name: given.get(name, torch.zeros_like(w)) for name, w in ours.items()}
     what = f"({preset}, N = {sizes.latent_vectors})"
     # the VN-ReLUs of a network that has learnt nothing amplify rounding; how much shows PyTorch's own
     exact = step(GRAPHS["folded"](sizes, ours, F64), sizes, batch, F64)[1]
@@ -125,7 +125,7 @@ def recorded(report, preset, path):
         error = difference(gradients, exact)
         report.within(f"gradients of the graph {name} in f32 {what} and of the folded in f64", error, 2e-2)
         allowed = max(allowed, 4 * error, 1e-4)
-    report.within(f"gradients of our step {what} and of the folded graph in f64", difference(slopes, exact), allowed)
+    report.within(f"gradients of our step {what} and of the folded graph in f64", difference(given, exact), allowed)
     bent = replace(sizes, losses={**sizes.losses, "mage": 1.01 * sizes.losses["mage"]})
     terms = {k: v.reshape(1) for k, v in step(graph(bent, ours), bent, batch, torch.float32)[0].items()}
     report.beyond("a weight of a loss that is 1 % off", difference(terms, values), 1e-4)

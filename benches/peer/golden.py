@@ -1,4 +1,4 @@
-"""The numbers that the authors' program gave (tests/golden; docs/MODEL.md has the equations), against both graphs."""
+"""The numbers that the reference implementation gave (tests/golden; docs/MODEL.md has the equations), against both graphs."""
 
 import json
 import math
@@ -17,7 +17,7 @@ GOLDEN = Path(__file__).resolve().parents[2] / "tests" / "golden"
 F64 = torch.float64
 # Our parts of the network and theirs
 PARTS = (("decoder", "field"), ("encoder", "encoder"))
-# Our losses by the authors' names
+# Our losses by the names of the reference implementation
 LOSSES = {
     "mage": "multi_scale_derivative_loss", "scale_invariant": "scale_inv_loss", "cosine": "cosine_similarity_loss",
     "kld": "kld_loss",
@@ -37,8 +37,8 @@ def official(tensors, prefix, into):
 
 def with_their_weights(graph, sizes, theirs, kind=torch.float32):
     """A graph with these weights of theirs; what the case does not have is drawn."""
-    made = GRAPHS[graph](sizes, {**weights.draw(sizes), **weights.from_authors(theirs, sizes)}, kind)
-    if graph == "authors":
+    made = GRAPHS[graph](sizes, {**weights.draw(sizes), **weights.from_reference(theirs, sizes)}, kind)
+    if graph == "reference":
         for name in made.weights.keys() & theirs.keys():
             made.weights[name].data.copy_(theirs[name])
     return made
@@ -53,7 +53,7 @@ def against(report, what, tolerances, found, expected):
             allowed = max(allowed, 10 * tolerances[name]["f32_err"])
         shares[name] = (found[name].detach() - b).abs().max().item() / allowed
     worst = max(shares, key=shares.get)
-    what = f"{what}: {len(expected)} numbers of the authors, in tolerances, worst {worst}"
+    what = f"{what}: {len(expected)} numbers of the reference implementation, in tolerances, worst {worst}"
     report.within(what, shares[worst], 1.0)
 
 
@@ -94,7 +94,7 @@ def decoder(report, graph):
     against(report, f"decoder, graph {graph}", tolerances, found, {name: tensors[name] for name in found})
 
     theirs = official(tensors, "grad.param.", "field.")
-    expected = weights.from_authors(theirs, sizes)
+    expected = weights.from_reference(theirs, sizes)
     keys = {ours: "grad.param." + key.removeprefix("field.") for ours, key, _, _ in weights.pairs(sizes)}
     rules = {ours: tolerances[keys[ours]] for ours in expected if keys[ours] in tolerances}
     against(report, f"gradients of the decoder, graph {graph}", rules, made.gradients(), expected)
@@ -151,7 +151,7 @@ def three_steps(report, graph):
         if index == 0:
             found.update({("grad", name): w.clone() for name, w in made.gradients().items()})
         optimiser.step()
-        now = weights.from_authors(made.weights, sizes) if graph == "authors" else made.weights
+        now = weights.from_reference(made.weights, sizes) if graph == "reference" else made.weights
         found.update({(f"after{index + 1}", name): w.detach().clone() for name, w in now.items()})
     expected, rules = {name: tensors[name] for name in totals}, {k: v for k, v in tolerances.items() if k in totals}
     keys = {ours: key for ours, key, _, _ in weights.pairs(sizes)}
@@ -160,20 +160,20 @@ def three_steps(report, graph):
         if key in tensors:
             label = f"{record} {name}"
             totals[label] = found[record, name]
-            expected[label] = weights.from_authors({keys[name]: tensors[key]}, sizes)[name]
+            expected[label] = weights.from_reference({keys[name]: tensors[key]}, sizes)[name]
             if key in tolerances:
                 rules[label] = tolerances[key]
     against(report, f"three training steps, graph {graph}", rules, totals, expected)
 
 
 def camera_directions(rows, columns):
-    """The authors' decoder frame: the centre looks along −y, the right along +x."""
+    """The reference implementation's decoder frame: the centre looks along −y, the right along +x."""
     x, y, z = training.panorama_directions(rows, columns, F64).unbind(-1)
     return torch.stack([-y, -x, z], -1).float()
 
 
 def look(lines, yaws, images):
-    """Turned directions [B, T, P, 3] and the colours the authors' lookup finds there."""
+    """Rotated directions [B, T, P, 3] and the colours the reference implementation's lookup finds there."""
     seen = []
     for yaw in yaws:
         (c, s), (x, y, z) = (yaw.cos(), yaw.sin()), lines.unbind(-1)

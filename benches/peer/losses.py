@@ -1,4 +1,4 @@
-"""The training losses on log radiance [B, H, W, 3], in the form of the paper and in that of the authors' program."""
+"""The training losses on log radiance [B, H, W, 3], in the form of the paper and in that of the reference implementation."""
 
 import math
 
@@ -7,7 +7,7 @@ from torch.nn import functional as F
 
 # Scharr's derivatives along a row and along a column
 SCHARR = torch.tensor([[[-3.0, 0, 3], [-10, 0, 10], [-3, 0, 3]], [[-3, -10, -3], [0, 0, 0], [3, 10, 3]]])
-# the authors' pair, whose second entry sums to 20
+# the reference implementation's pair, whose second entry sums to 20
 REFERENCE = torch.tensor([[[-3.0, 0, 3], [-10, 0, 10], [-3, 0, 3]], [[-3, 10, -3], [0, 0, 0], [3, 10, 3]]])
 
 
@@ -37,9 +37,9 @@ class Corrected:
             coarse = F.avg_pool2d(error, 2**scale) if scale else error
             # columns wrap around; rows at the poles, where the stencil does not fit, are left out
             wrapped = torch.cat([coarse[..., -1:], coarse, coarse[..., :1]], -1)
-            slopes = F.conv2d(wrapped, self.scharr).abs()
+            edges = F.conv2d(wrapped, self.scharr).abs()
             inner = solid_angle(coarse.shape[2], error.dtype)[0, 1:-1, :, 0]
-            total = total + (slopes * (inner / inner.mean())).mean()
+            total = total + (edges * (inner / inner.mean())).mean()
         return total / 2
 
     def scale_invariant(self, prediction, target):
@@ -47,7 +47,7 @@ class Corrected:
         mean = (error * self.rows).mean((1, 2, 3), keepdim=True)
         return ((error - mean).square() * self.rows).mean()
 
-    def level(self, prediction, target):
+    def exposure(self, prediction, target):
         return ((prediction - target) * self.rows).mean((1, 2, 3)).square().mean()
 
     def cosine(self, prediction, target):
@@ -64,7 +64,7 @@ class Corrected:
 
 
 class Reference:
-    """As the authors' program computes them: mask min(sin(πr/(H − 1)) + 0.001, 1) inside every term."""
+    """As the reference implementation computes them: mask min(sin(πr/(H − 1)) + 0.001, 1) inside every term."""
 
     def __init__(self, sizes, kind):
         height, _ = sizes.loss_size

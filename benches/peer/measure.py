@@ -1,4 +1,4 @@
-"""A training step of ours beside the same step in plain PyTorch: the authors' graph and the folded one.
+"""A training step of ours beside the same step in plain PyTorch: the reference graph and the folded one.
 
     python benches/peer/measure.py --veni target/release/examples/train_step --pairs 5 --threads 2
     python benches/peer/measure.py --veni target/release/examples/train_step --check
@@ -19,12 +19,12 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 DATA = HERE.parents[1] / "assets" / "panoramas"
 CASES = ["paper:9", "paper:100", "small:9"]
-PROGRAMS = ("ours", "authors", "folded")
-# With --mixed instead of the authors' graph, each program in f32 and with products in bfloat16
+PROGRAMS = ("ours", "reference", "folded")
+# With --mixed instead of the reference graph, each program in f32 and with products in bfloat16
 MIXED = ("ours", "ours-mixed", "folded", "folded-mixed")
-# What our losses and VN-ReLUs are called in the authors' form
+# What our losses and VN-ReLUs are called in the reference form
 REFERENCE = [
-    "loss.form=reference", "loss.level=0.0", "model.encoder.vn_relu=reference", "model.decoder.vn_relu=reference",
+    "loss.form=reference", "loss.exposure=0.0", "model.encoder.vn_relu=reference", "model.decoder.vn_relu=reference",
 ]
 # glibc gives large blocks back to the system and gets them page by page; ours does not use glibc's allocator
 ALLOCATOR = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": str(1 << 34), "MALLOC_TOP_PAD_": str(1 << 28)}
@@ -36,7 +36,7 @@ SAME = ("preset", "latent_vectors", "panoramas", "directions", "parameters")
 
 def command(program, preset, latent_vectors, options, record=None):
     if program.startswith("ours"):
-        mixed = ["decoder_by=kernels-bfloat16"] if program == "ours-mixed" else []
+        mixed = ["decoder_backend=kernels-bfloat16"] if program == "ours-mixed" else []
         extra = (["--record", record] if record else []) + mixed + (REFERENCE if options.form == "reference" else [])
         return [options.veni, str(DATA), preset, latent_vectors, str(options.steps), *extra]
     graph, _, mixed = program.partition("-")
@@ -101,7 +101,7 @@ def summary(case, pairs):
     return found
 
 
-NAMES = {"ours": "veni", "authors": "PyTorch, the authors' graph", "folded": "PyTorch, folded graph"}
+NAMES = {"ours": "veni", "reference": "PyTorch, the reference graph", "folded": "PyTorch, folded graph"}
 NAMES |= {"ours-mixed": "veni, bfloat16 in the decoder", "folded-mixed": "PyTorch, folded graph, autocast to bfloat16"}
 
 
@@ -132,7 +132,7 @@ def three(values):
 
 
 def checked(options):
-    """The graphs against each other, the authors' numbers, and a step of ours."""
+    """The graphs against each other, the numbers of the reference implementation, and a step of ours."""
     import check
 
     with tempfile.TemporaryDirectory() as folder:
@@ -153,7 +153,7 @@ def main():
     parser.add_argument("--cases", nargs="+", default=CASES, metavar="PRESET:N", help=f"default: {' '.join(CASES)}")
     parser.add_argument(
         "--form", choices=("corrected", "reference"), default="corrected",
-        help="losses and VN-ReLUs as ours has them by default, or as the authors' program has them; in all three alike",
+        help="losses and VN-ReLUs as ours has them by default, or as the reference implementation has them; in all three alike",
     )
     parser.add_argument(
         "--allocator", choices=("tuned", "plain"), default="tuned",
@@ -161,7 +161,7 @@ def main():
     )
     parser.add_argument(
         "--mixed", action="store_true",
-        help="each program in f32 and with products in bfloat16 (processors with AVX512-BF16), without the authors' graph",
+        help="each program in f32 and with products in bfloat16 (processors with AVX512-BF16), without the reference graph",
     )
     parser.add_argument("--json", action="store_true", help="print everything as JSON instead of tables")
     parser.add_argument("--check", action="store_true", help="compare numbers instead of times; exit code 1 if they differ")

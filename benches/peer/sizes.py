@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 REFERENCE_LOSSES = {"mage": 0.5, "scale_invariant": 1.0, "cosine": 1.0, "kld": 0.01}
-PAPER_LOSSES = {**REFERENCE_LOSSES, "level": 1.0}
+PAPER_LOSSES = {**REFERENCE_LOSSES, "exposure": 1.0}
 SMALL_LOSSES = {**PAPER_LOSSES, "mage": 0.1, "cosine": 0.1, "kld": 0.02, "ldr_mse": 15.0}
 
 
@@ -38,7 +38,7 @@ class Sizes:
     hidden: int = 128
     layers: int = 6
     decoder_heads: int = 8
-    # "corrected": VN-ReLUs project, losses as the paper describes them; "reference": both as in the authors' program
+    # "corrected": VN-ReLUs project, losses as the paper describes them; "reference": both as in the reference implementation
     form: str = "corrected"
     losses: dict = field(default_factory=lambda: dict(PAPER_LOSSES))
     decoder_rate: Rate = Rate(1e-4, 200, 40_001, 0.05)
@@ -52,8 +52,8 @@ class Sizes:
         return self.height // self.stride, self.width // self.stride
 
     def reference(self):
-        """The same network and weights as the authors' program computes them."""
-        kept = {name: weight for name, weight in self.losses.items() if name != "level"}
+        """The same network and weights as the reference implementation computes them."""
+        kept = {name: weight for name, weight in self.losses.items() if name != "exposure"}
         return replace(self, form="reference", losses=kept)
 
 

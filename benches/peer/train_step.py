@@ -1,6 +1,6 @@
 """Times training steps of one of the graphs in PyTorch and prints one line of JSON, as the example `train_step` does.
 
-    python benches/peer/train_step.py authors|folded PRESET LATENT_VECTORS STEPS [--threads T] [--form F] [--seed S] [--mixed]
+    python benches/peer/train_step.py reference|folded PRESET LATENT_VECTORS STEPS [--threads T] [--form F] [--seed S] [--mixed]
 """
 
 import argparse
@@ -33,7 +33,7 @@ def main():
     before = status("VmRSS")
     ours = weights.draw(sizes, arguments.seed)
     graph = GRAPHS[arguments.graph](sizes, ours)
-    # as many weights as ours: the authors' graph has the queries and keys of its decoder besides
+    # as many weights as ours: the reference graph has the queries and keys of its decoder besides
     parameters = sum(w.numel() for w in ours.values())
     del ours
     batches = [training.draw_batch(sizes, step) for step in range(1 + arguments.steps)]

@@ -1,6 +1,6 @@
-"""Weights by name: drawn, read from files, and rewritten between our names and layouts and the authors'.
+"""Weights by name: drawn, read from files, and rewritten between our names and layouts and those of the reference implementation.
 
-Ours are those of the model file: maps are [in, out], features [.., coordinate, channel]. The authors' maps are
+Ours are those of the model file: maps are [in, out], features [.., coordinate, channel]. The maps of the reference implementation are
 [out, in], features [.., channel, coordinate]. Every weight of ours has exactly one of theirs; theirs has the queries and
 keys of the decoder besides, which change nothing.
 """
@@ -152,20 +152,20 @@ def pairs(sizes):
             yield (f"{ours}.{norm}.beta", f"{theirs}.{norm}.bias", *same)
 
 
-def to_authors(ours, sizes, seed=1):
+def to_reference(ours, sizes, seed=1):
     """Our weights as theirs. The queries and keys of the decoder, which we do not have, are drawn."""
     found = {theirs: there(ours[name]).contiguous() for name, theirs, there, _ in pairs(sizes) if name in ours}
     generator = torch.Generator().manual_seed(seed)
-    hidden, told = sizes.hidden, 3 * sizes.latent_vectors
+    hidden, condition = sizes.hidden, 3 * sizes.latent_vectors
     kind = ours["decoder.output.weight"].dtype
     for layer in (f"field.network.layers.{index}.mha" for index in range(sizes.layers)):
-        for part, inputs in (("query", hidden), ("key", told)):
+        for part, inputs in (("query", hidden), ("key", condition)):
             for name, shape in ((f"{layer}.{part}.weight", (hidden, inputs)), (f"{layer}.{part}.bias", (hidden,))):
                 drawn = (2 * torch.rand(shape, generator=generator) - 1) / math.sqrt(inputs)
                 found[name] = drawn.to(kind)
     return found
 
 
-def from_authors(theirs, sizes):
+def from_reference(theirs, sizes):
     """Their weights (or gradients) by our names, those that are there."""
     return {ours: back(theirs[name]).contiguous() for ours, name, _, back in pairs(sizes) if name in theirs}

@@ -3,7 +3,7 @@
     check.py --cli VENI-CLI --packages FOLDER [--only NAME ...] [--picture FILE.png] [--details]
 
 One sky with a sun of its true size; each engine that is installed renders its folder of it, and two that are wrong on purpose: the sky
-turned by 90 degrees, and a sun of twice the irradiance. Prints a table; exit code 1 if an engine disagrees with its folder, or agrees
+rotated by 90 degrees, and a sun of twice the irradiance. Prints a table; exit code 1 if an engine disagrees with its folder, or agrees
 with a wrong one; 3 if none could be run.
 """
 
@@ -91,7 +91,7 @@ def main():
         for name, script, engine, extra, pictured in chosen:
             started, place = time.monotonic(), folder / engine
             place.mkdir()
-            cases = {"right": ("sky", []), "turned": ("sky", ["--turn", "90"]), "doubled": ("doubled", [])}
+            cases = {"right": ("sky", []), "rotated": ("sky", ["--turn", "90"]), "doubled": ("doubled", [])}
             made = {case: sky.folder(options.cli, folder / f"{source}.hdr", place / case, engine, *more, *extra)
                     for case, (source, more) in cases.items()}
             sample = None
@@ -114,7 +114,7 @@ def main():
             judge = lambda case: (judge_levels(done["cases"][case], options.details and case == "right") if script == "cmgen"
                                   else truth.judge(done["cases"][case], made[case][1]))
             shown, faults = judge("right")
-            caught = {case: judge(case)[1] for case in ("turned", "doubled")}
+            caught = {case: judge(case)[1] for case in ("rotated", "doubled")}
             row = f"{sum(map(bool, caught.values()))}/2 caught"
             print(f"{name:<17} {done['version']:<16} {shown[0]:>13} {shown[1]:>20} {shown[2]:>13} {shown[3]:>8} {row:>14} "
                   f"{time.monotonic() - started:>4.0f}", flush=True)

@@ -24,7 +24,7 @@ def paint(bpy, thing, colour, metal=False, roughness=1.0):
     thing.data.materials.append(material)
 
 
-def turned_to(mathutils, normal):
+def rotation_to(mathutils, normal):
     return mathutils.Vector(normal).to_track_quat("Z", "Y")
 
 
@@ -43,7 +43,7 @@ def build(bpy, mathutils, folder, picture):
     for normal in [] if picture else TOLD["walls"]:
         bpy.ops.mesh.primitive_plane_add(size=2, location=wall(normal))
         bpy.context.object.rotation_mode = "QUATERNION"
-        bpy.context.object.rotation_quaternion = turned_to(mathutils, normal)
+        bpy.context.object.rotation_quaternion = rotation_to(mathutils, normal)
         paint(bpy, bpy.context.object, 1)
     if not picture:
         bpy.ops.mesh.primitive_uv_sphere_add(segments=256, ring_count=128, radius=TOLD["ball"]["radius"], location=TOLD["ball"]["at"])
@@ -96,7 +96,7 @@ def work(job_):
 
         def radiance(at, normal, samples):
             camera.location = np.add(at, normal)
-            camera.rotation_quaternion = turned_to(mathutils, normal)
+            camera.rotation_quaternion = rotation_to(mathutils, normal)
             return render(bpy, built, job_["place"], 4, 4, samples).mean((0, 1))
 
         places = [radiance(at, [0, 0, 1], samples) for at, samples in zip(TOLD["places"], (1024, 256, 256))]
@@ -107,7 +107,7 @@ def work(job_):
         built = build(bpy, mathutils, job_["picture"], True)
         told, camera = TOLD["camera"], built.camera
         camera.location = told["eye"]
-        camera.rotation_quaternion = turned_to(mathutils, np.subtract(told["eye"], told["target"]))
+        camera.rotation_quaternion = rotation_to(mathutils, np.subtract(told["eye"], told["target"]))
         camera.data.sensor_fit, camera.data.angle = "VERTICAL", math.radians(told["degrees"])
         done["pixels"] = render(bpy, built, job_["place"], *TOLD["size"], 64)
     return done

@@ -41,12 +41,12 @@ FRAMES = {
 
 def told(engine):
     """Everything above in the engine's frame, as JSON takes it."""
-    turn = lambda v: (np.asarray(v, float) @ FRAMES[engine].T).tolist()
+    in_frame = lambda v: (np.asarray(v, float) @ FRAMES[engine].T).tolist()
     return {
-        "pole": POLE, "places": turn(PLACES), "walls": turn(sky.WALLS), "wall_at": turn(WALL_AT),
-        "ball": {**BALL, "at": turn(BALL["at"])}, "mirrors": turn(MIRRORS),
-        "spheres": [{**s, "at": turn(s["at"])} for s in SPHERES],
-        "camera": {**CAMERA, "eye": turn(CAMERA["eye"]), "target": turn(CAMERA["target"])},
+        "pole": POLE, "places": in_frame(PLACES), "walls": in_frame(sky.WALLS), "wall_at": in_frame(WALL_AT),
+        "ball": {**BALL, "at": in_frame(BALL["at"])}, "mirrors": in_frame(MIRRORS),
+        "spheres": [{**s, "at": in_frame(s["at"])} for s in SPHERES],
+        "camera": {**CAMERA, "eye": in_frame(CAMERA["eye"]), "target": in_frame(CAMERA["target"])},
         "ground": GROUND, "stone": STONE, "size": SIZE,
     }
 
@@ -70,23 +70,23 @@ class Truth:
         self.mirrors = rest[(row * sky.HEIGHT).astype(int), (column * sky.WIDTH).astype(int)]
         for walls in self.walls.values():
             for other in (walls[[1, 2, 3, 0]], walls[[0, 3, 2, 1]], walls[[2, 1, 0, 3]]):
-                assert np.abs(other / walls - 1).max() > 1.5 * WALL_BAR, "walls do not tell a turned or mirrored map"
+                assert np.abs(other / walls - 1).max() > 1.5 * WALL_BAR, "walls do not tell a rotated or mirrored map"
 
     def judge(self, found, scale):
         """What is shown of a measurement, and what is wrong with it."""
         plane, behind, before = np.array(found["places"]) / (scale * self.plane)
         walls = np.array(found["walls"]) / (scale * self.walls[found["walls_see_the_sun"]])
         mirrors = np.array(found["mirrors"]) / (scale * self.mirrors)
-        off, turned, seen = (np.abs(share - 1).max() for share in (plane, walls, mirrors))
+        off, rotated, seen = (np.abs(share - 1).max() for share in (plane, walls, mirrors))
         faults = []
         if off > PLANE_BAR:
             faults.append(f"the plane is off by {100 * off:.2f} %")
         if not behind.mean() < 0.8 < before.mean():
             faults.append(f"beside the pole there is {behind.mean():.2f} of the light away from the sun, {before.mean():.2f} towards it")
-        if turned > WALL_BAR:
-            faults.append(f"walls are off by {100 * turned:.1f} %")
+        if rotated > WALL_BAR:
+            faults.append(f"walls are off by {100 * rotated:.1f} %")
         if seen > MIRROR_BAR:
             faults.append(f"the mirror is off by {100 * seen:.1f} %")
         side = "right" if behind.mean() < 0.8 < before.mean() else "WRONG"
-        shown = [f"{100 * off:.3f} %", f"{side} ({behind.mean():.2f}, {before.mean():.2f})", f"{100 * turned:.2f} %", f"{100 * seen:.2f} %"]
+        shown = [f"{100 * off:.3f} %", f"{side} ({behind.mean():.2f}, {before.mean():.2f})", f"{100 * rotated:.2f} %", f"{100 * seen:.2f} %"]
         return shown, faults

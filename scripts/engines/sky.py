@@ -106,5 +106,5 @@ def small(bits, mantissa):
     return np.where(exponent == 0, fraction * 2.0 ** -14, (1 + fraction) * np.exp2(exponent - 15))
 
 
-# walls by their native normals: they tell how a map is turned, and whether it is mirrored
+# walls by their native normals: they tell how a map is rotated, and whether it is mirrored
 WALLS = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], float)

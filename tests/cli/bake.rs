@@ -69,19 +69,19 @@ fn a_baked_image_is_its_own_latent() {
 }
 
 #[test]
-fn turning_is_rolling_columns_and_exposure_is_doubling() {
+fn rotating_is_rolling_columns_and_exposure_is_doubling() {
     let dir = Dir::new();
     bake(&dir, &["--seed", "5", "--float", "-o", "plain.exr"]);
     let plain = exr(&dir.path("plain.exr"));
     for (degrees, columns) in [("90", 16), ("-90", 48), ("5.625", 1), ("180", 32), ("360", 0)] {
-        bake(&dir, &["--seed", "5", "--float", "--turn", degrees, "-o", "turned.exr", "--force"]);
-        let turned = exr(&dir.path("turned.exr"));
-        // turned counter-clockwise, what was in column i appears further to the left
-        let difference = turned.difference(&plain.rolled(columns));
+        bake(&dir, &["--seed", "5", "--float", "--turn", degrees, "-o", "rotated.exr", "--force"]);
+        let rotated = exr(&dir.path("rotated.exr"));
+        // rotated counter-clockwise, what was in column i appears further to the left
+        let difference = rotated.difference(&plain.rolled(columns));
         assert!(difference < 1e-4, "{degrees} degrees: {difference}");
     }
-    bake(&dir, &["--seed", "5", "--float", "--turn", "90", "-o", "turned.exr", "--force"]);
-    assert!(exr(&dir.path("turned.exr")).difference(&plain.rolled(17)) > 1e-3, "the test can fail");
+    bake(&dir, &["--seed", "5", "--float", "--turn", "90", "-o", "rotated.exr", "--force"]);
+    assert!(exr(&dir.path("rotated.exr")).difference(&plain.rolled(17)) > 1e-3, "the test can fail");
     bake(&dir, &["--seed", "5", "--float", "--exposure", "-2", "-o", "dark.exr"]);
     let mut dark = exr(&dir.path("dark.exr"));
     dark.pixels.iter_mut().flatten().for_each(|v| *v *= 4.0);

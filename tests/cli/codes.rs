@@ -74,12 +74,12 @@ fn the_sun_of_a_panorama_is_in_its_code_and_its_energy_in_every_picture() {
     // a sun that half precision does not hold is known before it is met
     let run = dir.run(&["bake", "sky.json", "-o", "half.exr", "--size", "256", "--exposure", "5"]);
     assert!(run.code == Some(0) && run.err.matches("beyond half precision").count() == 1, "{}", run.err);
-    // a baked file gives back the code, lights included, and turns with it
-    dir.ok(&["bake", "512x256.exr", "--turn", "90", "-o", "turned.exr"]);
-    let [turned] = &dir.json(&["light", "turned.exr"])[..] else { panic!("one object") };
-    let azimuth = (turned["sun"]["azimuth"].as_f64().unwrap() - f64::from(sun.azimuth().to_degrees()))
+    // a baked file gives back the code, lights included, and rotates with it
+    dir.ok(&["bake", "512x256.exr", "--turn", "90", "-o", "rotated.exr"]);
+    let [rotated] = &dir.json(&["light", "rotated.exr"])[..] else { panic!("one object") };
+    let azimuth = (rotated["sun"]["azimuth"].as_f64().unwrap() - f64::from(sun.azimuth().to_degrees()))
         .rem_euclid(360.0);
-    assert!((azimuth - 90.0).abs() < 0.5, "{azimuth}: {turned}");
+    assert!((azimuth - 90.0).abs() < 0.5, "{azimuth}: {rotated}");
 }
 
 #[test]

@@ -220,7 +220,7 @@ fn what_cannot_be_fitted_is_refused_before_any_work() {
     refused(&[&sky, "-o", "a.json", "--completed", "c.exr", "--size", "8x8"], &["--size 8x8"]);
     refused(&[&sky, "--prior=-1"], &["prior = -1"]);
     refused(&[&sky, "--share", "0.1"], &["--share", "--preset energy"]);
-    refused(&[&sky, "--preset", "energy", "--share", "2"], &["share = 2", "0..=1"]);
+    refused(&[&sky, "--preset", "energy", "--share", "2"], &["weight = 2", "0..=1"]);
     refused(&[&sky, "--resolution", "32x32"], &["--resolution"]);
     let marquardt = ["--method", "levenberg-marquardt"];
     refused(&[&[sky.as_str(), "--rate", "0.1"][..], &marquardt].concat(), &["--rate", "adam"]);
@@ -251,7 +251,7 @@ fn the_light_on_a_ball_is_found() {
     let dull = ["ball.exr", "--normals", "n.exr", "--lights", "32", "-o", "dull.json", "--starts", "2"];
     let dull = fit(&dir, &dull);
     assert!(dull["loss"].as_f64() > found["loss"].as_f64(), "{dull} {found}");
-    // the reference's form shades otherwise than this picture was shaded: it is fitted too, but not as well
+    // the reference's form shades otherwise than this image was rendered: it is fitted too, but not as well
     let reference = |steps: &str| {
         let args = [&all[..], &["--shading", "reference", "--force", "--steps", steps]].concat();
         let [value] = &dir.json(&[&["fit", "--model", model()], &args[..]].concat())[..] else {

@@ -109,7 +109,7 @@ fn targets_that_are_none_are_one_error_each() {
         dir.refused(&["fit", "--target-sh", name, "-o", "o.json", "-q"], words);
     }
     let surfaces = [
-        ("flat.json", r#"[{"normal":[0,0,0],"illuminance":1}]"#, &["flat.json", "no direction"][..]),
+        ("flat.json", r#"[{"normal":[0,0,0],"illuminance":1}]"#, &["flat.json", "not a direction"][..]),
         ("less.json", r#"[{"normal":[0,0,1],"illuminance":-1}]"#, &["less.json", "-1", "not negative"]),
         ("lux.json", r#"[{"normal":[0,0,1],"lux":1}]"#, &["lux.json", "\"lux\"", "illuminance"]),
         ("north.json", r#"{"irradiance":{"north":[1,1,1]}}"#, &["north.json", "north", "up, down"]),

@@ -160,8 +160,8 @@ fn one_engine_is_the_folder_itself_and_the_sun_can_stay() {
         let (a, b) = (kept.pixel(column, row), sky.pixel((column + 64) % 256, row));
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-3 * b), "{a:?} {b:?}");
     }
-    let json = dir.json(&["ibl", "sky.exr", "--engine", "pbrt", "-o", "turned", "--turn", "90"]);
-    // the sun turns with the sky: azimuth −36.87° becomes 53.13°
+    let json = dir.json(&["ibl", "sky.exr", "--engine", "pbrt", "-o", "rotated", "--turn", "90"]);
+    // the sun rotates with the sky: azimuth −36.87° becomes 53.13°
     assert!((json[0]["sun"]["azimuth"].as_f64().unwrap() - 53.13).abs() < 0.5, "{}", json[0]);
 }
 

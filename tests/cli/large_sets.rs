@@ -26,7 +26,7 @@ fn a_set_beyond_its_memory_trains_the_same_model_and_leaves_no_file() {
     let contains = |word: &[u8]| model.windows(word.len()).any(|window| window == word);
     assert!(contains(b"data.memory_mib=0") && !contains(b"scratch"), "a path of this machine");
     assert!(std::fs::read_dir(dir.path("scratch")).unwrap().next().is_none());
-    // it goes on from where its settings say
+    // it resumes as its settings say
     std::fs::remove_dir(dir.path("scratch")).unwrap();
     let resumed = dir.run(&["train", "--resume", "--out", "file", "--quiet"]);
     assert_eq!(resumed.code, Some(2));

@@ -40,8 +40,8 @@ fn dirty(dir: &Dir) {
     copy("chinese_garden", "in/no_extension");
     copy("forest_slope", "in/stem.exr");
     copy("garden_nook", "in/deep/stem.exr");
-    let turned = Panorama::read(original("forest_slope")).unwrap().turn(1.3);
-    exr(&turned, &dir.path("in/turned.exr"));
+    let rotated = Panorama::read(original("forest_slope")).unwrap().rotated(1.3);
+    exr(&rotated, &dir.path("in/turned.exr"));
     let mut bright = Panorama::read(original("garden_nook")).unwrap().mirror();
     bright.scale(8.0);
     exr(&bright, &dir.path("in/bright_mirror.exr"));
@@ -119,9 +119,9 @@ fn a_dirty_folder_becomes_a_training_set() {
     assert_eq!(split("in/turned.exr"), split("in/stem.exr"));
     assert_eq!(split("in/bright_mirror.exr"), split("in/deep/stem.exr"));
     let alike = report_1["near_duplicates"].as_array().unwrap();
-    let turned = alike.iter().find(|a| a["second"] == "in/turned.exr").unwrap();
-    let degrees = turned["turn_degrees"].as_f64().unwrap();
-    assert!(turned["first"] == "in/stem.exr" && (degrees - 1.3f64.to_degrees()).abs() < 3.0, "{turned}");
+    let rotated = alike.iter().find(|a| a["second"] == "in/turned.exr").unwrap();
+    let degrees = rotated["rotation_degrees"].as_f64().unwrap();
+    assert!(rotated["first"] == "in/stem.exr" && (degrees - 1.3f64.to_degrees()).abs() < 3.0, "{rotated}");
     assert!(alike.iter().any(|a| a["first"] == "in/bright_mirror.exr" && a["mirrored"] == true));
     assert_eq!(alike.len(), 2, "{alike:?}");
 
@@ -255,7 +255,7 @@ fn given_splits_are_kept_and_held_out_copies_leave_training() {
             std::fs::copy(original(name), dir.path("in").join(side).join(format!("{name}.exr"))).unwrap();
         }
     }
-    let leak = Panorama::read(original("canary_wharf")).unwrap().turn(-2.0);
+    let leak = Panorama::read(original("canary_wharf")).unwrap().rotated(-2.0);
     exr(&leak, &dir.path("in/train/leak.exr"));
     picture("qwantani_night").save_with_format(dir.path("in/night.png"), ImageFormat::Png).unwrap();
     dir.ok(&["prepare", "in", "-o", "data", "-q", "--val", "0"]);

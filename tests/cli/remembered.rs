@@ -80,7 +80,7 @@ fn images_of_older_versions_are_baked_from_their_latents() {
 }
 
 #[test]
-fn an_image_that_was_edited_is_encoded_and_one_that_was_only_stored_anew_is_not() {
+fn an_image_that_was_edited_is_encoded_and_one_that_was_only_stored_again_is_not() {
     let dir = Dir::new();
     let bake = |extra: &[&str]| dir.ok(&[&["bake", "--seed", "7", "--size", "64", "-q"], extra].concat());
     bake(&["-o", "half.exr", "-o", "sky.hdr"]);
@@ -203,7 +203,7 @@ fn prepare_says_which_sources_are_gone() {
     assert!(std::fs::read_to_string(dir.path("set/report.md")).unwrap().contains("sources are gone"));
     let json = dir.json(&["prepare", "src", "-o", "set", "--size", "32", "--val", "0"]);
     assert_eq!(json[0]["gone"], report["counts"]["gone"]);
-    let anew = dir.run(&["prepare", "src", "-o", "set", "--size", "32", "--val", "0", "--force"]);
-    assert!(!anew.err.contains("gone") && !dir.path("set/train/one.exr").exists(), "{}", anew.err);
+    let again = dir.run(&["prepare", "src", "-o", "set", "--size", "32", "--val", "0", "--force"]);
+    assert!(!again.err.contains("gone") && !dir.path("set/train/one.exr").exists(), "{}", again.err);
     assert!(dir.path("set/train/two.exr").is_file());
 }

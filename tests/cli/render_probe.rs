@@ -100,7 +100,7 @@ fn light_comes_from_where_the_panorama_has_it() {
         (v, v, v)
     })
     .unwrap();
-    // looking along +x, the sun is behind the sphere; turned by 90 degrees it stands at +y, on the left
+    // looking along +x, the sun is behind the sphere; rotated by 90 degrees it stands at +y, on the left
     let brightest = |turn: &str, azimuth: &str| {
         dir.ok(&[
             "render-probe",

@@ -43,7 +43,7 @@ fn mixed_precision_trains_where_the_processor_has_it() {
     let run = dir.run(&mixed("run"));
     if std::fs::read_to_string("/proc/cpuinfo").is_ok_and(|cpu| cpu.contains("avx512_bf16")) {
         assert_eq!((run.code, run.err.as_str()), (Some(0), ""), "{run:?}");
-        assert_eq!(configured(&dir, "run", "decoder_by"), "kernels-bfloat16");
+        assert_eq!(configured(&dir, "run", "decoder_backend"), "kernels-bfloat16");
         let again = dir.run(&[mixed("run"), vec!["--resume"]].concat());
         assert_eq!(again.code, Some(0), "{again:?}");
         // the stored command begins the same run
@@ -51,16 +51,19 @@ fn mixed_precision_trains_where_the_processor_has_it() {
         assert!(said.contains("--mixed-precision"), "{said}");
     } else {
         assert_eq!((run.code, run.out.as_str(), run.err.lines().count()), (Some(2), "", 1), "{run:?}");
-        assert!(run.err.contains("kernels-bfloat16") && run.err.contains("decoder_by = kernels"), "{run:?}");
+        assert!(
+            run.err.contains("kernels-bfloat16") && run.err.contains("decoder_backend = kernels"),
+            "{run:?}"
+        );
         assert!(dir.files().is_empty(), "{:?}", dir.files());
     }
     let run = dir.run(&[args(&data, "other", "wgpu"), vec!["--mixed-precision"]].concat());
     assert!(run.code == Some(2) && run.err.contains("--mixed-precision"), "{run:?}");
-    let run = dir.run(&[mixed("other"), vec!["--set", "decoder_by=tensors"]].concat());
+    let run = dir.run(&[mixed("other"), vec!["--set", "decoder_backend=tensors"]].concat());
     assert!(run.code == Some(2) && run.err.contains("a --set takes it back"), "{run:?}");
     let tokens = ["--set", "model.decoder.conditioning=tokens"];
     let run = dir.run(&[mixed("other"), tokens.to_vec()].concat());
-    assert!(run.code == Some(2) && run.err.contains("decoder_by = tensors"), "{run:?}");
+    assert!(run.code == Some(2) && run.err.contains("decoder_backend = tensors"), "{run:?}");
     assert!(!dir.path("other").exists());
 }
 
@@ -141,7 +144,7 @@ fn without_a_graphics_device_auto_takes_the_processor_and_wgpu_is_refused() {
     let run = finish(&mut without_drivers(&dir, &args(&data, "run", "auto")));
     assert_eq!((run.code, run.err.as_str()), (Some(0), ""), "{run:?}");
     assert_eq!(configured(&dir, "run", "device"), "flex");
-    assert_eq!(configured(&dir, "run", "decoder_by"), "kernels");
+    assert_eq!(configured(&dir, "run", "decoder_backend"), "kernels");
 }
 
 /// Two updates on the graphics device from the panoramas to the model.
@@ -166,7 +169,7 @@ fn a_run_on_a_graphics_device_is_the_run_on_the_processor() {
     assert!(said.is_some_and(|said| name.starts_with(said)), "{name}: {run:?}");
     assert_eq!(run.err.contains("is a software adapter; --device flex is faster"), software, "{run:?}");
     assert_eq!(configured(&dir, "gpu", "device"), "wgpu");
-    assert_eq!(configured(&dir, "gpu", "decoder_by"), "tensors");
+    assert_eq!(configured(&dir, "gpu", "decoder_backend"), "tensors");
 
     let run = dir.run(&loud("cpu", "flex"));
     assert!(run.code == Some(0) && !run.err.contains("training on"), "{run:?}");

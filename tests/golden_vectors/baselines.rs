@@ -1,4 +1,5 @@
-//! The authors' baselines: spherical harmonics and spherical Gaussians, as fields, of images, and ten steps of a fit.
+//! The reference implementation's baselines: spherical harmonics and spherical Gaussians, as fields, of images, and ten
+//! steps of a fit.
 
 use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared};
@@ -25,7 +26,7 @@ pub(crate) fn run(case: &Case, _device: &Device) -> Option<Outcome> {
         }
         "SG field fitted to a log image" => {
             let grid = gaussian_grid(case);
-            starts_as_the_authors(case, &grid.start());
+            starts_as_the_reference(case, &grid.start());
             fit(case, |d, x| grid.log_radiance(d, x), |d, x, probe| grid.gradient(d, x, probe));
         }
         _ => return None,
@@ -81,7 +82,7 @@ fn gaussian_grid(case: &Case) -> Grid {
 }
 
 /// The recorded start is the one that the reference form documents.
-fn starts_as_the_authors(case: &Case, start: &[f64]) {
+fn starts_as_the_reference(case: &Case, start: &[f64]) {
     let recorded = wide(case.data("in.params0"));
     assert_eq!(recorded.len(), start.len(), "numbers to start from");
     assert!(recorded.iter().zip(start).all(|(a, b)| (a - b).abs() < 1e-7), "{recorded:?} and {start:?}");

@@ -1,6 +1,6 @@
 //! The VN-ViT encoder.
 //!
-//! The authors' `mirror` lives here and not in our encoder: "early" negates the x of the directions, "late"
+//! The reference implementation's `mirror` lives here and not in our encoder: "early" negates the x of the directions, "late"
 //! negates the x of what comes out, once in training and (by a bug of theirs) twice, that is not at all, in
 //! evaluation.
 
@@ -113,8 +113,8 @@ fn compare(case: &Case, official: &Official, device: &Device) {
     official.compare_gradients(case, &encoder, &gradients);
 }
 
-/// The authors' weights on their directions; and on clean directions, without a mirror, the weights they rewrote and
-/// those we rewrite.
+/// The reference implementation's weights on their directions; and on clean directions, without a mirror, the weights
+/// they rewrote and those we rewrite.
 fn import(case: &Case, official: &Official, device: &Device) {
     let colours = images(case.data("in.colors"), true, device);
     let check = |encoder: &Encoder, directions: Tensor<4>| {

@@ -218,7 +218,7 @@ pub(crate) fn form(case: &Case) -> VnReluForm {
     if case.module().starts_with("RENI") { VnReluForm::ReferenceNormGuard } else { VnReluForm::Reference }
 }
 
-/// The authors' decoder with its weights, from `case` (parameters under `prefix` in front of each key).
+/// The reference implementation's decoder with its weights, from `case` (parameters under `prefix` in front of each key).
 pub(crate) fn build(case: &Case, prefix: &str, device: &Device) -> Decoder {
     let sizes = Sizes::of(case);
     let mut rng = Stream::from_seed(0);

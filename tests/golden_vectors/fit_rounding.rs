@@ -1,9 +1,10 @@
 //! What the last bit costs in the RENI++ evaluation fits, whose files record no f32 error.
 //!
 //! With Adam's ε of 1e-15 and steps of 0.1 the fit is nearly chaotic, and its gradient jumps where a ray's hidden unit
-//! crosses the kink of its ReLU: which side a value of 1e-8 is on, the last bit decides. The same fit in f32 with weights
-//! that were moved to a neighbouring f32 at random ends up to 4e-4 away, in a few discrete jumps; with no such event
-//! 1e-6. The authors' numbers must lie within what that does, and the allowance in [`fit`](crate::fit) must be of its size.
+//! crosses the kink of its ReLU: which side a value of 1e-8 is on, the last bit decides. The same fit in f32 with
+//! weights that were moved to a neighbouring f32 at random ends up to 4e-4 away, in a few discrete jumps; with no such
+//! event 1e-6. The reference implementation's numbers must lie within what that does, and the allowance in
+//! [`fit`](crate::fit) must be of its size.
 
 use crate::case::Case;
 use crate::fit::{allowance, evaluate};

@@ -19,7 +19,7 @@ pub(crate) fn run(case: &Case, device: &Device) -> Option<Outcome> {
     Some(Compared)
 }
 
-/// The authors' names of the terms, of their weights in the file, and ours.
+/// The reference implementation's names of the terms, of their weights in the file, and ours.
 const TERMS: [(&str, &str, &str); 7] = [
     ("cosine_similarity_loss", "cosine", "cosine"),
     ("scale_inv_loss", "scale_inv", "scale_invariant"),
@@ -41,7 +41,7 @@ fn weighted(case: &Case, device: &Device) {
         mage_scales: case.size("scales").unwrap_or(2),
         mage: weight("mage"),
         scale_invariant: weight("scale_inv"),
-        level: WeightSchedule::Constant(0.0),
+        exposure: WeightSchedule::Constant(0.0),
         cosine: weight("cosine"),
         kld: weight("kld"),
         log_mse: weight("log_mse"),

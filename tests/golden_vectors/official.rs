@@ -1,11 +1,11 @@
-//! The authors' encoder: their options and keys against ours. Without burn, as [`case`](super::case).
+//! The reference implementation's encoder: its options and keys against ours. Without burn, as [`case`](super::case).
 
 use super::bindings::{Bindings, Kind, Linear, Transformer};
 use super::case::{Case, Data};
 use super::model::{EncoderConfig, Pooling, Reduction, VectorLayer, VnReluForm};
 use serde_json::Value;
 
-/// The authors' encoder: our configuration of it, and where its weights are.
+/// The reference implementation's encoder: our configuration of it, and where its weights are.
 pub(crate) struct Official {
     pub(crate) config: EncoderConfig,
     pub(crate) latent_vectors: usize,
@@ -107,7 +107,7 @@ fn bindings(config: &EncoderConfig, latent_vectors: usize, prefix: &str) -> Bind
     all
 }
 
-/// The authors' line sampling, `[T, P, 3]`: both ends of azimuth and of height are included.
+/// The reference implementation's line sampling, `[T, P, 3]`: both ends of azimuth and of height are included.
 pub(crate) fn line_directions(stripes: usize, samples: usize) -> Data {
     let heights = ((stripes * samples / 2) as f64).sqrt().round() as usize;
     let azimuths = 2 * heights;

@@ -5,8 +5,8 @@ use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared, Outcome::Elsewhere, Outcome::Skipped, double, field};
 use burn::tensor::{Device, Tensor};
 use veni::shade::{
-    Camera, Colour, ExposureForm, Lights, Material, ShadedImage, ShadedLoss, ShadingForm, Specular, Surface,
-    Transfer,
+    Camera, Colour, ExposureForm, Lights, Material, RenderedImage, RenderingLoss, ShadingForm, Specular,
+    Surface, Transfer,
 };
 use veni::sphere::{Equirect, reference};
 
@@ -118,7 +118,7 @@ fn shaders(case: &Case) {
 /// The surface of a case, from its normals, its mask and these rays.
 fn surface(case: &Case, rays: &str) -> Surface {
     let size = case.size("S").expect("the size S of the image");
-    // the camera of the authors gives these rays
+    // the camera of the reference implementation gives these rays
     compare(case, rays, &Camera::reference().rays(size, size));
     let mask: Vec<bool> = case.data("in.mask").values.iter().map(|v| *v != 0.0).collect();
     let normals = triples(case, "in.normals");
@@ -144,8 +144,8 @@ fn renderings(case: &Case) {
         let image = transfer.render(&exp(&log));
         compare(case, &format!("out.render.{name}"), &image);
         let target: Vec<_> = image.iter().map(|p| p.map(|v| 1.3 * v)).collect();
-        let shaded = ShadedImage::new(transfer, &target, ShadedLoss::ReferenceLog).expect("a target");
-        let (loss, gradient, exposure) = shaded.evaluate(&log, 0.0);
+        let rendered = RenderedImage::new(transfer, &target, RenderingLoss::ReferenceLog).expect("a target");
+        let (loss, gradient, exposure) = rendered.evaluate(&log, 0.0);
         // here the background, which no light reaches, is compared with 1.3 times itself too
         let hidden = surface.valid().iter().filter(|v| !**v).count() as f64 / image.len() as f64;
         case.compare_scalar(&format!("out.loss.{name}"), loss + 100.0 * hidden * 1.3f64.ln());
@@ -169,10 +169,10 @@ fn inverse(case: &Case, device: &Device) {
     let target = transfer.render(&exp(&triples(case, "in.env_log")));
     compare(case, "out.gt_render", &target);
     let image = |loss| {
-        let image = ShadedImage::new(transfer.clone(), &target, loss).expect("a target");
+        let image = RenderedImage::new(transfer.clone(), &target, loss).expect("a target");
         image.with_exposure(ExposureForm::Reference)
     };
-    let (figure, demo) = (image(ShadedLoss::ReferenceLog), image(ShadedLoss::demo()));
+    let (figure, demo) = (image(RenderingLoss::ReferenceLog), image(RenderingLoss::demo()));
     let decoder = field::build(case, "", device);
     let directions = field::map_directions(&case.data("in.env_log").shape, device);
     assert_eq!(reference::decoder_directions(grid).len(), directions.dims()[0]);

@@ -135,7 +135,7 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// The authors' line sampling, turned by each image's yaw: directions and colours [B, T, P, 3].
+    /// The reference implementation's line sampling, rotated by each image's yaw: directions and colours [B, T, P, 3].
     fn samples(&self, yaws: &[f32], device: &Device) -> (Tensor<4>, Tensor<4>) {
         let [t, p] = self.stripes;
         let stripes = Stripes::new(t, p, StripeSampling::Reference).unwrap_or_else(|e| panic!("{e}"));
@@ -144,7 +144,7 @@ impl Scene<'_> {
         for (image, yaw) in self.images.iter().zip(yaws) {
             let (sin, cos) = yaw.sin_cos();
             directions.extend(lines.iter().flat_map(|[x, y, z]| [cos * x + sin * y, cos * y - sin * x, *z]));
-            colours.extend(stripes.gather_turned(self.grid, f64::from(*yaw)).sample(image).into_flattened());
+            colours.extend(stripes.gather_rotated(self.grid, f64::from(*yaw)).sample(image).into_flattened());
         }
         let tensor = |values| Data::new([yaws.len(), t, p, 3], values).tensor([yaws.len(), t, p, 3], device);
         (tensor(directions), tensor(colours))

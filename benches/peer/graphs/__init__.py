@@ -5,7 +5,7 @@ Directions and log radiance of the encoder are [B, T, P, 3], the mean [B, N, 3],
 the decoder are [R, 3], shared by all panoramas, its log radiance [B, R, 3].
 """
 
-from .authors import Authors
+from .reference import Reference
 from .folded import Folded
 
-GRAPHS = {"authors": Authors, "folded": Folded}
+GRAPHS = {"reference": Reference, "folded": Folded}

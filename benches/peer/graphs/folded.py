@@ -99,8 +99,8 @@ class Folded:
         radius = directions[:, :2].norm(dim=-1, keepdim=True)
         basis = torch.cat([directions, radius, torch.ones_like(radius)], -1)
         basis = basis.expand(latent.shape[0], -1, -1)
-        told = self.told(latent).flatten(1)
-        attention = [self.attention(told, index) for index in range(self.sizes.layers)]
+        condition = self.condition(latent).flatten(1)
+        attention = [self.attention(condition, index) for index in range(self.sizes.layers)]
         weight, bias = self.weights["decoder.input.weight"], self.weights["decoder.input.bias"]
         inputs = 4 * (n + 2)
         products = self.products(latent)
@@ -116,7 +116,7 @@ class Folded:
             x = self.norm(x + self.linear(F.relu(self.linear(x, f"{layer}.ff1")), f"{layer}.ff2"), f"{layer}.norm2")
         return self.linear(x, "decoder.output")
 
-    def told(self, latent):
+    def condition(self, latent):
         """The closed form of the Vector-Neuron invariants, and z: [B, N, 3] → [B, N, 3]."""
         scale, linear, w, u = (self.weights[f"decoder.condition.{part}"] for part in ("scale", "linear", "w", "u"))
         t = (scale * latent[..., :2]).square().sum(-1, keepdim=True)
@@ -144,9 +144,9 @@ class Folded:
         quarter[4] = math.pi / 2
         return torch.cat([waves, waves + quarter], -1)
 
-    def attention(self, told, index):
+    def attention(self, condition, index):
         layer = f"decoder.layers.{index}"
-        return self.linear(self.linear(told, f"{layer}.value"), f"{layer}.out")
+        return self.linear(self.linear(condition, f"{layer}.value"), f"{layer}.out")
 
     def linear(self, x, name):
         return F.linear(x, self.weights[f"{name}.weight"].T, self.weights[f"{name}.bias"])

@@ -14,7 +14,7 @@ use veni_light::output::Overwrite;
 use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::picture::{FrameName, Layout, Picture, preview_tonemap};
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::Report;
 use crate::size::Size;
 
@@ -104,22 +104,22 @@ impl Pictures {
             report.note(beyond(peak));
             precision = Precision::Float;
         }
-        let bars = Bars::new(report);
+        let progress = ProgressBars::new(report);
         loop {
             let (files, mut range) = (files(precision)?, Range::default());
             let watch = may_change && precision == Precision::Half && has_exr(&files);
-            bars.begin("", "row", Some(picture.grid().height as u64));
+            progress.begin("", "row", Some(picture.grid().height as u64));
             let result = output::write_all(&files, picture.grid(), &mut |push| {
                 baker.rows(picture.directions(), &mut |row| {
                     range.see(row)?;
                     if watch && range.beyond_half().is_some() {
                         return Err(veni_light::Error::invalid("beyond the range of half precision"));
                     }
-                    bars.add(1);
+                    progress.add(1);
                     push(row)
                 })
             });
-            bars.end();
+            progress.end();
             match (result, range.beyond_half()) {
                 (Ok(()), _) => break,
                 (Err(_), Some(value)) if watch && value >= f32::MIN_POSITIVE => {

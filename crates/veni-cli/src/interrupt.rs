@@ -1,4 +1,5 @@
-//! Ctrl-C and requests to terminate: whatever runs ends at once and leaves no half-written file, unless it asked to be told.
+//! Ctrl-C and requests to terminate: whatever runs ends at once and leaves no half-written file, unless it handles the first
+//! signal itself.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -7,10 +8,10 @@ use veni_light::output::abandon;
 
 use crate::report::complain;
 
-/// What is told of the first signal instead of ending, and what is said then.
-static TOLD: Mutex<Option<Told>> = Mutex::new(None);
+/// What handles the first signal instead of the end of the process.
+static HANDLER: Mutex<Option<Handler>> = Mutex::new(None);
 
-struct Told {
+struct Handler {
     flag: &'static AtomicBool,
     said: &'static str,
 }
@@ -24,17 +25,17 @@ pub(crate) fn watch() {
 
 /// From now on the first signal raises the flag and says `said`; the second one ends the process.
 #[cfg(feature = "learn")]
-pub(crate) fn tell(said: &'static str) -> &'static AtomicBool {
+pub(crate) fn handle(said: &'static str) -> &'static AtomicBool {
     let flag: &AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
-    *TOLD.lock().unwrap_or_else(PoisonError::into_inner) = Some(Told { flag, said });
+    *HANDLER.lock().unwrap_or_else(PoisonError::into_inner) = Some(Handler { flag, said });
     flag
 }
 
 /// A signal came. Whether the process is to go on.
 fn goes_on() -> bool {
-    let told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
-    match &*told {
-        Some(Told { flag, said }) if !flag.swap(true, Ordering::Relaxed) => {
+    let handler = HANDLER.lock().unwrap_or_else(PoisonError::into_inner);
+    match &*handler {
+        Some(Handler { flag, said }) if !flag.swap(true, Ordering::Relaxed) => {
             complain(said);
             true
         }

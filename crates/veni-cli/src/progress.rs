@@ -10,8 +10,8 @@ use bar::Bar;
 
 pub(crate) use bar::duration;
 
-/// What a command shows of its work: one bar at a time, that of what began last. Several threads may tell it.
-pub(crate) struct Bars {
+/// What a command shows of its work: one bar at a time, that of what began last. Several threads may report to it.
+pub(crate) struct ProgressBars {
     report: Report,
     current: Mutex<Option<Work>>,
 }
@@ -23,7 +23,7 @@ struct Work {
     done: u64,
 }
 
-impl Bars {
+impl ProgressBars {
     pub(crate) fn new(report: Report) -> Self {
         Self { report, current: Mutex::new(None) }
     }
@@ -48,7 +48,7 @@ impl Bars {
         }
     }
 
-    /// So many more are.
+    /// This many more units are done.
     pub(crate) fn add(&self, units: u64) {
         if let Some(work) = self.current().as_mut() {
             work.advance(work.done + units, "");
@@ -74,7 +74,7 @@ impl Bars {
     }
 }
 
-impl Drop for Bars {
+impl Drop for ProgressBars {
     fn drop(&mut self) {
         self.end();
     }
@@ -103,20 +103,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_done_never_becomes_less_and_new_work_begins_anew() {
-        let bars = Bars::new(Report::new(false, true));
-        let done = || bars.current().as_ref().map(|work| work.done);
-        bars.advance(3, "");
+    fn what_is_done_never_becomes_less_and_new_work_begins_at_zero() {
+        let progress = ProgressBars::new(Report::new(false, true));
+        let done = || progress.current().as_ref().map(|work| work.done);
+        progress.advance(3, "");
         assert_eq!(done(), None, "nothing has begun");
-        bars.begin_after(2, "", "row", Some(9));
+        progress.begin_after(2, "", "row", Some(9));
         assert_eq!(done(), Some(2));
-        bars.advance(5, "");
-        bars.advance(4, "late");
-        bars.add(2);
+        progress.advance(5, "");
+        progress.advance(4, "late");
+        progress.add(2);
         assert_eq!(done(), Some(7));
-        bars.begin("", "row", None);
+        progress.begin("", "row", None);
         assert_eq!(done(), Some(0));
-        bars.end();
+        progress.end();
         assert_eq!(done(), None);
     }
 }

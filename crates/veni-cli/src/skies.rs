@@ -64,7 +64,7 @@ impl Change {
     /// The changed latent: what files record.
     pub(crate) fn of(self, latent: &Latent) -> Latent {
         let mut latent =
-            if self.turn == 0.0 { latent.clone() } else { latent.turned(self.turn.to_radians()) };
+            if self.turn == 0.0 { latent.clone() } else { latent.rotated(self.turn.to_radians()) };
         latent.log_exposure += (self.exposure * std::f64::consts::LN_2) as f32;
         latent
     }

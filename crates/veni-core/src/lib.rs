@@ -8,7 +8,7 @@
 //! | [`sphere`], [`latent`], [`model`], [`field`] | veni-light | what a renderer embeds |
 //! | [`panorama`] | veni-image | panoramas in and out, colour, tone mapping, metrics |
 //! | [`synth`] | veni-synth | generated scenes |
-//! | [`fit`], [`shade`] | veni-fit | encoder in plain f32, latent optimisation, shaded surfaces |
+//! | [`fit`], [`shade`] | veni-fit | encoder in plain f32, latent optimisation, rendered surfaces |
 //! | [`data`], [`prepare`], [`expand`] | veni-data | panoramas for training |
 //!
 //! The bridge between training and use is the model file.

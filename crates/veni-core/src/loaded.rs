@@ -207,7 +207,7 @@ impl LoadedModel {
         latents.iter().map(one).collect()
     }
 
-    /// Trainable numbers of (encoder, decoder).
+    /// Trainable parameters of (encoder, decoder).
     pub fn parameters(&self) -> [usize; 2] {
         let count = |prefix: &str| {
             let own = self.model.tensors().iter().filter(|(name, _)| name.starts_with(prefix));

@@ -110,8 +110,8 @@ impl Dataset {
         Self::load_observed(files, grid, &ReadOptions::default(), &Silent)
     }
 
-    /// [`Dataset::load`] with limits of what is read, and an observer of its progress, who is told what files say that is not
-    /// applied.
+    /// [`Dataset::load`] with limits of what is read, and an observer, to which progress is reported and what files say
+    /// that is not applied.
     ///
     /// # Errors
     /// As [`Dataset::load`].

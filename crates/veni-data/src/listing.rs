@@ -13,7 +13,7 @@ const LOW_RANGE: [&str; 12] =
 const MOST_NAMED: usize = 5;
 
 /// The `.exr` and `.hdr` files directly inside `folder`, sorted by name; a file stands for itself. What looks like a panorama
-/// and is none to this program (a link to nowhere, an image with a display's range) is left out, and `observer` is told.
+/// and is none to this program (a link to nowhere, an image with a display's range) is left out and reported to `observer`.
 ///
 /// # Errors
 /// [`Error::Io`] if the folder cannot be listed.

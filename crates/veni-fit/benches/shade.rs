@@ -1,12 +1,12 @@
-//! One evaluation of a shaded image, loss and gradient, as a fit does it hundreds of times:
-//! `cargo bench -p veni-core --no-default-features --bench shade`.
+//! One evaluation of a rendered image, loss and gradient, as a fit does it hundreds of times:
+//! `cargo bench -p veni-fit --bench shade`.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use veni_fit::shade::{
-    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedImage, ShadedLoss, ShadingForm, Surface,
-    Transfer,
+    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm,
+    Surface, Transfer,
 };
 use veni_light::sphere::Equirect;
 
@@ -32,7 +32,7 @@ fn shade(c: &mut Criterion) {
                 let transfer =
                     Transfer::with_memory(&surface, material, lights, ShadingForm::Physical, memory).unwrap();
                 let target = transfer.render(&vec![[1.0; 3]; grid.len()]);
-                let image = ShadedImage::new(transfer, &target, ShadedLoss::default()).unwrap();
+                let image = RenderedImage::new(transfer, &target, RenderingLoss::default()).unwrap();
                 group.bench_function(format!("{name}, {kept}"), |b| {
                     b.iter(|| image.evaluate(black_box(&light), 0.1));
                 });

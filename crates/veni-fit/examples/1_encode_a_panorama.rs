@@ -1,4 +1,4 @@
-//! A panorama as a code of 27 numbers, by the encoder, and the panorama that the code stands for.
+//! A panorama as a code of latent dimension 27, by the encoder, and the panorama that the code stands for.
 //!
 //! ```sh
 //! cargo run --release -p veni-fit --example 1_encode_a_panorama -- street.hdr    # without a name: one of assets/panoramas

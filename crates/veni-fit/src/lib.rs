@@ -3,7 +3,7 @@
 //! | here | what |
 //! |---|---|
 //! | [`Encoder`] | the VN-ViT in plain f32: from a panorama to the posterior over latents |
-//! | [`fit()`], [`fit_shaded`] | latent optimisation under the folded decoder, of panoramas, parts of them, photographs, lit surfaces |
+//! | [`fit()`], [`fit_rendered`] | latent optimisation under the folded decoder, of panoramas, parts of them, photographs, lit surfaces |
 //! | [`fit_linear`], [`LinearTarget`] | the same of harmonics, irradiance and illuminance alone; [`targets`] reads them |
 //! | [`Observation`] | from a picture to what can be fitted |
 //! | [`shade`] | what a surface looks like under distant light, and the gradient of that |
@@ -36,7 +36,7 @@ pub use encoder::{Encoded, Encoder};
 pub use fit::{
     Achieved, Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient,
     LinearTarget, Method, Objective, PanoramaLoss, Plateau, Received, best_light, best_linear, best_of, fit,
-    fit_linear, fit_shaded, fit_with, from_each, likely_linear, matching_exposure, random_starts,
+    fit_linear, fit_rendered, fit_with, from_each, likely_linear, matching_exposure, random_starts,
 };
 pub use observation::Observation;
 pub use veni_light::{Error, Result};

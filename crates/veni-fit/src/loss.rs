@@ -31,7 +31,8 @@ pub struct LossConfig {
     /// Exposure (log-mean) term: squared mean log error per image. The corrected forms of the terms above and of the
     /// cosine are all blind to a factor on the radiance; without this the decoder's exposure would be
     /// arbitrary. Not in the paper, whose gradient and cosine terms fix the exposure by accident.
-    pub level: WeightSchedule,
+    #[serde(alias = "level")]
+    pub exposure: WeightSchedule,
     /// Colour direction.
     pub cosine: WeightSchedule,
     /// Divergence of the posterior from the prior.
@@ -56,7 +57,7 @@ impl Default for LossConfig {
             mage_scales: 2,
             mage: constant(0.5),
             scale_invariant: constant(1.0),
-            level: constant(1.0),
+            exposure: constant(1.0),
             cosine: constant(1.0),
             kld: constant(0.01),
             log_mse: constant(0.0),
@@ -70,6 +71,6 @@ impl Default for LossConfig {
 impl LossConfig {
     /// The reference implementation: reference forms, the paper's weights, no separate exposure term.
     pub fn reference() -> Self {
-        Self { form: LossForm::Reference, level: WeightSchedule::Constant(0.0), ..Self::default() }
+        Self { form: LossForm::Reference, exposure: WeightSchedule::Constant(0.0), ..Self::default() }
     }
 }

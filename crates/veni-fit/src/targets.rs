@@ -73,13 +73,13 @@ fn surfaces(text: &str) -> Result<Vec<([f32; 3], Received)>> {
 }
 
 fn parse(text: &str, wanted: &str) -> Result<Value> {
-    serde_json::from_str(text).map_err(|e| Error::invalid(format!("is no JSON ({e}); give {wanted}")))
+    serde_json::from_str(text).map_err(|e| Error::invalid(format!("is not JSON ({e}); give {wanted}")))
 }
 
 fn way(name: &str, value: &Value) -> Result<([f32; 3], Received)> {
     let Some((_, normal)) = WAYS.iter().find(|(way, _)| *way == name) else {
         return Err(Error::invalid(format!(
-            "\"irradiance\" has {}, which is no way to face; they are up, down, front, left, back and right, and a \
+            "\"irradiance\" has {}, which is not a direction to face; they are up, down, front, left, back and right, and a \
              list of objects with \"normal\" has any",
             shown(&name.into())
         )));

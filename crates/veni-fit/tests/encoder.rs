@@ -61,13 +61,13 @@ fn panorama(seed: u32) -> Vec<f32> {
     (0..3 * GRID.len()).map(|_| 3.0 * number()).collect()
 }
 
-/// Moved `columns` to the left: turned about z by 2π · columns/W.
+/// Moved `columns` to the left: rotated about z by 2π · columns/W.
 fn rolled(image: &[f32], columns: usize) -> Vec<f32> {
     let row = |row: &[f32]| [&row[3 * columns..], &row[..3 * columns]].concat();
     image.chunks_exact(3 * GRID.width).flat_map(row).collect()
 }
 
-fn turned(vectors: &[[f32; 3]], angle: f32) -> Vec<[f32; 3]> {
+fn rotated(vectors: &[[f32; 3]], angle: f32) -> Vec<[f32; 3]> {
     let (sin, cos) = angle.sin_cos();
     vectors.iter().map(|[x, y, z]| [cos * x - sin * y, sin * x + cos * y, *z]).collect()
 }
@@ -83,7 +83,7 @@ fn error(got: &Encoded, expected: &[[f32; 3]]) -> f32 {
     difference(got.vectors.as_flattened(), expected.as_flattened())
 }
 
-/// How far encoding a rolled panorama is from turning the code.
+/// How far encoding a rolled panorama is from rotating the code.
 fn equivariance(encoder: &Encoder, columns: usize) -> f32 {
     let image = panorama(2);
     let encode = |image: &[f32]| encoder.encode(GRID, &[image]).expect("a panorama").remove(0);
@@ -91,13 +91,13 @@ fn equivariance(encoder: &Encoder, columns: usize) -> f32 {
     let angle = TAU * columns as f32 / GRID.width as f32;
     if let (Some(a), Some(b)) = (&straight.log_variances, &other.log_variances) {
         let invariance = difference(b, a);
-        return invariance.max(error(&other, &turned(&straight.vectors, angle)));
+        return invariance.max(error(&other, &rotated(&straight.vectors, angle)));
     }
-    error(&other, &turned(&straight.vectors, angle))
+    error(&other, &rotated(&straight.vectors, angle))
 }
 
 #[test]
-fn rolling_by_whole_stripes_turns_the_latent() {
+fn rolling_by_whole_stripes_rotates_the_latent() {
     for (name, config) in variants() {
         let encoder = encoder(&config);
         let columns = GRID.width / STRIPES;
@@ -117,7 +117,7 @@ fn the_check_of_equivariance_can_fail() {
 }
 
 #[test]
-fn turned_and_mirrored_directions_turn_and_mirror_the_latent() {
+fn rotated_and_mirrored_directions_rotate_and_mirror_the_latent() {
     let mirror = |v: &[[f32; 3]]| v.iter().map(|[x, y, z]| [*x, -y, *z]).collect::<Vec<_>>();
     for (name, config) in variants() {
         let encoder = encoder(&config);
@@ -131,9 +131,9 @@ fn turned_and_mirrored_directions_turn_and_mirror_the_latent() {
         let straight = encode(&directions);
         assert_eq!(straight.vectors.len(), N);
         assert_eq!(straight.log_variances.is_some(), config.variational, "{name}");
-        let other = encode(&turned(&directions, 0.9));
-        assert!(error(&other, &turned(&straight.vectors, 0.9)) < 1e-5, "{name}");
-        assert!(error(&other, &straight.vectors) > 1e-3, "{name}: nothing turned");
+        let other = encode(&rotated(&directions, 0.9));
+        assert!(error(&other, &rotated(&straight.vectors, 0.9)) < 1e-5, "{name}");
+        assert!(error(&other, &straight.vectors) > 1e-3, "{name}: nothing rotated");
         let other = encode(&mirror(&directions));
         assert!(error(&other, &mirror(&straight.vectors)) < 1e-5, "{name}");
     }

@@ -41,7 +41,7 @@ fn each_preset_lowers_its_loss_and_is_best_under_its_own_objective() {
     };
     let first = fit(&decoder, &target, std::slice::from_ref(&none), &presets[0].1).unwrap().latents.remove(0);
     let found = presets.map(|(_, config)| {
-        // all go on from one place, so that each can only be led away from it by what it looks at
+        // all start from one place, so that each can only be led away from it by what it looks at
         fit(&decoder, &target, std::slice::from_ref(&first), &config).unwrap().latents.remove(0)
     });
     for (k, (name, config)) in presets.iter().enumerate() {

@@ -47,7 +47,7 @@ fn on_cpu(c: &mut Criterion, model: &Model, latent: &Latent, n: usize) {
 
 fn on_gpu(c: &mut Criterion, opened: &Opened, model: &Model, latent: &Latent, n: usize, sizes: &[[u32; 2]]) {
     let (device, queue) = (&opened.device, &opened.queue);
-    let decoder = GpuDecoder::new(device, model).expect("room for the weights");
+    let decoder = GpuDecoder::new(device, model).expect("memory for the weights");
     let latents = decoder.condition(queue, latent).expect("a latent of this model");
     let mut group = c.benchmark_group(format!("N = {n} on {opened}"));
     group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(1));

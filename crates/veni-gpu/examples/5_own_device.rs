@@ -5,7 +5,7 @@
 //! cargo run --release -p veni-gpu --example 5_own_device            # --seed 7 --model FILE
 //! ```
 //!
-//! Every frame the sky turns by 30 degrees. One command encoder takes two passes: veni bakes the turned light into the
+//! Every frame the sky rotates by 30 degrees. One command encoder takes two passes: veni bakes the rotated light into the
 //! host's cube map, and the host's own pass samples that cube map to compute an ambient cube, the irradiance of a
 //! surface towards each of the six axes (G. McTaggart, "Half-Life 2 / Valve Source Shading"). The numbers are compared
 //! with the same sums over the field on the CPU, and after 90 degrees each face of the cube map must hold the texels
@@ -113,11 +113,11 @@ fn main() -> Result<()> {
 
     let field = model.decoder()?.condition(&latent)?;
     let mut out = std::io::stdout();
-    let (mut worst, mut unturned) = (0f32, Vec::new());
+    let (mut worst, mut unrotated) = (0f32, Vec::new());
     for step in 0..=3 {
-        let turn = TAU / 12.0 * f64::from(step);
+        let angle = TAU / 12.0 * f64::from(step);
         // a few kilobytes into the same buffer
-        decoder.update(&queue, &latents, 0, &[latent.turned(turn)])?;
+        decoder.update(&queue, &latents, 0, &[latent.rotated(angle)])?;
 
         // one encoder: the light, then what the host does with it; one submission, by the host
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -127,11 +127,11 @@ fn main() -> Result<()> {
 
         // only to print it: a renderer goes on on the device
         let found = read_back::buffer(&device, &queue, &host.irradiance)?;
-        let expected = ambient_cube(&field.turned(turn));
+        let expected = ambient_cube(&field.rotated(angle));
         writeln!(
             out,
-            "turned by {:.0} degrees: irradiance, and its relative difference from the CPU",
-            turn.to_degrees()
+            "rotated by {:.0} degrees: irradiance, and its relative difference from the CPU",
+            angle.to_degrees()
         )?;
         for ((axis, found), expected) in AXES.iter().zip(&found).zip(&expected) {
             let difference = largest_difference(found, expected);
@@ -140,17 +140,17 @@ fn main() -> Result<()> {
             writeln!(out, "  {axis}  {r:.4} {g:.4} {b:.4}  {difference:.1e}")?;
         }
         if step == 0 {
-            unturned = read_back::texture(&device, &queue, &cube)?;
+            unrotated = read_back::texture(&device, &queue, &cube)?;
         }
     }
 
     // Native +x is glTF's +x, native +y is glTF's -z: a quarter turn moves the light of face +x to -z, -x, +z and back.
-    let turned = read_back::texture(&device, &queue, &cube)?;
+    let rotated = read_back::texture(&device, &queue, &cube)?;
     let face =
         |texels: &[[f32; 3]], face: usize| texels[face * texels.len() / 6..][..texels.len() / 6].to_vec();
     let mut moved = 0f32;
     for (from, to) in [(0, 5), (5, 1), (1, 4), (4, 0)] {
-        for (found, expected) in face(&turned, to).iter().zip(&face(&unturned, from)) {
+        for (found, expected) in face(&rotated, to).iter().zip(&face(&unrotated, from)) {
             moved = moved.max(largest_difference(found, expected));
         }
     }

@@ -29,14 +29,14 @@ fn veni_light_atan2(y: f32, x: f32) -> f32 {
     return select(angle, -angle, (bitcast<u32>(y) & 0x80000000u) != 0u);
 }
 
-// A direction of the packed light, as the turned scene has it.
-fn veni_light_turned(d: vec3f) -> vec3f {
-    let t = veni_light.turn;
+// A direction of the packed light, as the rotated scene has it.
+fn veni_light_rotated(d: vec3f) -> vec3f {
+    let t = veni_light.rotation;
     return vec3f(d.x * t.y - d.y * t.x, d.y * t.y + d.x * t.x, d.z);
 }
 
 // And back.
-fn veni_light_unturned(d: vec3f) -> vec3f {
-    let t = veni_light.turn;
+fn veni_light_unrotated(d: vec3f) -> vec3f {
+    let t = veni_light.rotation;
     return vec3f(d.x * t.y + d.y * t.x, d.y * t.y - d.x * t.x, d.z);
 }

@@ -2,7 +2,7 @@
 
 // Irradiance of a surface with this unit normal, by everything above its horizon. Not below 0, as nine harmonics may be.
 fn veni_irradiance(normal: vec3f) -> vec3f {
-    let n = veni_light_unturned(normal);
+    let n = veni_light_unrotated(normal);
     let s = veni_light.diffuse;
     var sum = s[0].xyz + s[1].xyz * n.y + s[2].xyz * n.z + s[3].xyz * n.x;
     sum += s[4].xyz * (n.x * n.y) + s[5].xyz * (n.y * n.z) + s[6].xyz * (3.0 * n.z * n.z - 1.0);

@@ -1,6 +1,6 @@
 // A light as `pack_light` packs it: a sun, which is a disc, and a map of everything else.
 //
-//   veni_light         the uniform VeniLight, 464 bytes. Its first eight turn the scene about z; write them to turn it.
+//   veni_light         the uniform VeniLight, 464 bytes. Its first eight rotate the scene about z; write them to rotate it.
 //   veni_light_cells   Walker's alias table, a power of two of cells: the bits of the probability that a cell is its own
 //                      pixel, and the pixel that it is otherwise
 //   veni_light_texels  W x H pixels of the map, row-major from the top: linear Rec. 709 radiance, and the density with
@@ -10,8 +10,8 @@
 // Directions are native unit vectors: z up, the centre of a panorama +x, its left quarter +y.
 
 struct VeniLight {
-    // Sine and cosine of the turn, counter-clockwise seen from above
-    turn: vec2f,
+    // Sine and cosine of the rotation, counter-clockwise seen from above
+    rotation: vec2f,
     // W, H
     size: vec2u,
     // Two directions across the sun's
@@ -32,7 +32,7 @@ struct VeniLight {
     diffuse: array<vec4f, 9>,
 }
 
-// All directions as they are before the turn.
+// All directions as they are before the rotation.
 struct VeniCompactLight {
     direction: vec3f,
     // Angular radius, radians

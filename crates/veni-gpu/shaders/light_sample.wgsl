@@ -30,7 +30,7 @@ fn veni_sample_light(u: vec2f) -> VeniLightSample {
         inside = veni_light_in_sun(own);
     }
     let both = veni_light_both(texel, inside);
-    return VeniLightSample(veni_light_turned(own), both.w, both.xyz);
+    return VeniLightSample(veni_light_rotated(own), both.w, both.xyz);
 }
 
 // The density with which `veni_sample_light` draws a unit direction, 1/sr.
@@ -45,7 +45,7 @@ fn veni_light_radiance(direction: vec3f) -> vec3f {
 
 // Radiance and density.
 fn veni_light_seen(direction: vec3f) -> vec4f {
-    let own = veni_light_unturned(direction);
+    let own = veni_light_unrotated(direction);
     return veni_light_both(veni_light_texels[veni_light_pixel(own)], veni_light_in_sun(own));
 }
 
@@ -81,7 +81,7 @@ fn veni_light_place(u: vec2f) -> VeniLightPlace {
     return VeniLightPlace(pixel, (vec2f(floor(coarse), fine) + 0.5) / 4096.0);
 }
 
-// The direction of a place before the turn, even in cos(theta); beside a pole by sin^2 of half the angle, since f32 does
+// The direction of a place before the rotation, even in cos(theta); beside a pole by sin^2 of half the angle, since f32 does
 // not hold 1 - cos(theta).
 fn veni_light_direction(place: VeniLightPlace) -> vec3f {
     let size = veni_light.size;

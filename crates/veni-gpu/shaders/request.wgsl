@@ -1,7 +1,7 @@
 // One bake: what `Request` in request.rs writes.
 
 struct VeniRequest {
-    // Native direction = x * axis_x + y * axis_y + z * axis_z: the frame, then the turn.
+    // Native direction = x * axis_x + y * axis_y + z * axis_z: the frame, then the rotation.
     axis_x: vec3f,
     // 0 equirectangular, 1 cube faces
     arrangement: u32,

@@ -13,9 +13,9 @@
 //!     Ok((shader::light_bindings(1, 0) + &shader::light(), GpuLight::new(device, &packed)?))
 //! }
 //!
-//! /// Per frame: the sky turns.
+//! /// Per frame: the sky rotates.
 //! fn frame(light: &GpuLight, queue: &Queue, radians: f64) -> veni_gpu::Result<()> {
-//!     light.turn(queue, radians)
+//!     light.rotate(queue, radians)
 //! }
 //! ```
 
@@ -50,17 +50,17 @@ impl GpuLight {
         })
     }
 
-    /// Turns the scene to `radians` about z, counter-clockwise seen from above, from where it was packed: eight bytes. Takes effect
-    /// for what is submitted after it.
+    /// Rotates the scene to `radians` about z, counter-clockwise seen from above, from where it was packed: eight
+    /// bytes. Takes effect for what is submitted after it.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the angle is not finite; [`Error::Gpu`] if the device fails.
-    pub fn turn(&self, queue: &Queue, radians: f64) -> Result<()> {
+    pub fn rotate(&self, queue: &Queue, radians: f64) -> Result<()> {
         if !radians.is_finite() {
-            return Err(Error::invalid(format!("a turn by {radians} radians: it must be finite")));
+            return Err(Error::invalid(format!("a rotation by {radians} radians: it must be finite")));
         }
-        guarded(&self.device, "turn of a light", || {
-            queue.write_buffer(&self.uniform, 0, &LightUniform::turn_bytes(radians));
+        guarded(&self.device, "rotation of a light", || {
+            queue.write_buffer(&self.uniform, 0, &LightUniform::rotation_bytes(radians));
         })
     }
 

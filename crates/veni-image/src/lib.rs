@@ -13,7 +13,7 @@
 //! | what is unknown of a panorama | [`Panorama::known`], [`Panorama::fill`] |
 //! | pictures of any shape, masks | [`Picture`], [`read_mask`] |
 //! | NaN, infinite, negative values | [`Panorama::sanitise`] |
-//! | other sizes, turned, mirrored | [`Panorama::resample`], [`Panorama::turn`], [`Panorama::mirror`] |
+//! | other sizes, rotated, mirrored | [`Panorama::resample`], [`Panorama::rotated`], [`Panorama::mirror`] |
 //! | what the model works on | [`Panorama::log`], [`Panorama::mean_log_luminance`], [`exposure`] |
 //! | to a screen | [`tonemap`], [`Sheet`] |
 //! | what large or damaged files may take | [`limits`], [`Budget`], [`memory`] |

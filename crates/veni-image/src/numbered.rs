@@ -5,16 +5,16 @@ use std::collections::BTreeMap;
 
 use crate::{Error, Result};
 
-/// More parts than this are no text of ours.
+/// More parts than this were not written by this crate.
 const MAX_PARTS: usize = 1 << 16;
 
-/// The attributes in the order of their names, each value in parts of at most `room(name)` bytes, name as it is written.
+/// The attributes in the order of their names, each value in parts of at most `limit(name)` bytes, name as it is written.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a name that is one of a part, or so long that nothing fits behind it.
 pub(crate) fn split(
     attributes: &BTreeMap<String, String>,
-    room: impl Fn(&str) -> usize,
+    limit: impl Fn(&str) -> usize,
 ) -> Result<Vec<(String, String)>> {
     let mut all = Vec::new();
     for (name, value) in attributes {
@@ -23,23 +23,23 @@ pub(crate) fn split(
                 "the attribute {name:?} is not free: such names have the parts of long texts"
             )));
         }
-        if value.len() <= room(name) {
+        if value.len() <= limit(name) {
             all.push((name.clone(), value.clone()));
             continue;
         }
-        all.extend(parts(name, value, &room).ok_or_else(|| {
+        all.extend(parts(name, value, &limit).ok_or_else(|| {
             Error::invalid(format!("the attribute {name:?} cannot be written: its name is too long"))
         })?);
     }
     Ok(all)
 }
 
-/// Parts of a long value; the number of digits of the last one decides the room, so it is tried.
-fn parts(name: &str, value: &str, room: &impl Fn(&str) -> usize) -> Option<Vec<(String, String)>> {
+/// Parts of a long value; the number of digits of the last one decides the limit of all, so it is tried.
+fn parts(name: &str, value: &str, limit: &impl Fn(&str) -> usize) -> Option<Vec<(String, String)>> {
     (1..=5usize).find_map(|digits| {
         let nines = "9".repeat(digits);
-        let room = room(&format!("{name}[{nines}/{nines}]"));
-        let pieces = pieces(value, room)?;
+        let limit = limit(&format!("{name}[{nines}/{nines}]"));
+        let pieces = pieces(value, limit)?;
         let last = pieces.len();
         (last.to_string().len() == digits).then(|| {
             let named = |(k, piece): (usize, &&str)| {
@@ -51,10 +51,10 @@ fn parts(name: &str, value: &str, room: &impl Fn(&str) -> usize) -> Option<Vec<(
 }
 
 /// Cuts between characters, and not beside white space where that can be helped: readers may trim it.
-fn pieces(mut rest: &str, room: usize) -> Option<Vec<&str>> {
+fn pieces(mut rest: &str, limit: usize) -> Option<Vec<&str>> {
     let mut pieces = Vec::new();
-    while rest.len() > room {
-        let bounds = || (1..=room).rev().filter(|at| rest.is_char_boundary(*at));
+    while rest.len() > limit {
+        let bounds = || (1..=limit).rev().filter(|at| rest.is_char_boundary(*at));
         let solid = |at: &usize| {
             let (left, right) = rest.split_at(*at);
             !left.ends_with(char::is_whitespace) && !right.starts_with(char::is_whitespace)

@@ -19,22 +19,22 @@ impl Panorama {
     /// linear interpolation between pixel centres (columns wrap, rows continue beyond a pole on the other side).
     #[must_use]
     pub fn resample(&self, grid: Equirect) -> Self {
-        self.resample_turned(grid, 0.0)
+        self.resample_rotated(grid, 0.0)
     }
 
-    /// The panorama turned by `radians` about +z, counter-clockwise seen from above: what was seen in direction
-    /// d is now seen in direction R d. A turn by a whole number of columns moves pixels without touching their
-    /// values; any other is linear between columns. Its latent is the old one turned by the same angle.
+    /// The panorama rotated by `radians` about +z, counter-clockwise seen from above: what was seen in direction
+    /// d is now seen in direction R d. A rotation by a whole number of columns moves pixels without touching their
+    /// values; any other is linear between columns. Its latent is the old one rotated by the same angle.
     #[must_use]
-    pub fn turn(&self, radians: f64) -> Self {
-        self.resample_turned(self.grid, radians)
+    pub fn rotated(&self, radians: f64) -> Self {
+        self.resample_rotated(self.grid, radians)
     }
 
-    /// [`Panorama::turn`] and [`Panorama::resample`] in one pass, with one interpolation instead of two.
+    /// [`Panorama::rotated`] and [`Panorama::resample`] in one pass, with one interpolation instead of two.
     ///
     /// Where some of the panorama is unknown, each pixel is the mean of what is known under it.
     #[must_use]
-    pub fn resample_turned(&self, grid: Equirect, radians: f64) -> Self {
+    pub fn resample_rotated(&self, grid: Equirect, radians: f64) -> Self {
         let Some(known) = &self.known else {
             let pixels = self.average(&self.pixels, grid, radians);
             return Self { grid, pixels, known: None, ..self.without_pixels() };
@@ -109,7 +109,7 @@ impl Panorama {
     }
 }
 
-/// Columns to the left that a turn moves the content by; whole to within rounding becomes exactly whole.
+/// Columns to the left that a rotation moves the content by; whole to within rounding becomes exactly whole.
 fn shift(width: usize, radians: f64) -> f64 {
     let columns = (radians / (2.0 * PI)).rem_euclid(1.0) * width as f64;
     if (columns - columns.round()).abs() < 1e-6 { columns.round() } else { columns }
@@ -236,14 +236,14 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_moves_what_is_seen_counter_clockwise() {
-        // a light at +x, turned by a quarter, is at +y
+    fn a_rotation_moves_what_is_seen_counter_clockwise() {
+        // a light at +x, rotated by a quarter, is at +y
         let source = Panorama::from_fn(Equirect::new(64, 32), |[x, y, z]| {
             let towards = if x > 0.9 { 10.0 } else { 1.0 };
             [towards, 1.0 + 0.1 * y, 1.0 + 0.1 * z]
         });
-        let turned = source.turn(0.5 * PI);
-        let (i, j) = turned
+        let rotated = source.rotated(0.5 * PI);
+        let (i, j) = rotated
             .grid()
             .directions()
             .iter()
@@ -251,13 +251,13 @@ mod tests {
             .max_by(|a, b| a.1[1].total_cmp(&b.1[1]))
             .map(|(k, _)| (k % 64, k / 64))
             .unwrap();
-        assert_eq!(turned.pixel(i, j)[0], 10.0);
+        assert_eq!(rotated.pixel(i, j)[0], 10.0);
         // whole columns: bits, and back again
-        assert_eq!(turned.turn(-0.5 * PI), source);
-        assert_eq!(source.turn(2.0 * PI), source);
-        assert_eq!(source.turn(2.0 * PI / 64.0).pixel(9, 3), source.pixel(10, 3));
+        assert_eq!(rotated.rotated(-0.5 * PI), source);
+        assert_eq!(source.rotated(2.0 * PI), source);
+        assert_eq!(source.rotated(2.0 * PI / 64.0).pixel(9, 3), source.pixel(10, 3));
         // half a column: the mean of two
-        let half = source.turn(PI / 64.0);
+        let half = source.rotated(PI / 64.0);
         let mean = 0.5 * (source.pixel(20, 9)[1] + source.pixel(21, 9)[1]);
         assert!((half.pixel(20, 9)[1] - mean).abs() < 1e-6);
     }
@@ -273,10 +273,10 @@ mod tests {
     }
 
     #[test]
-    fn turning_while_shrinking_conserves_energy() {
+    fn rotating_while_shrinking_conserves_energy() {
         let source = sky(256, 128);
         for (a, b) in
-            energy(&source).iter().zip(energy(&source.resample_turned(Equirect::new(64, 32), 1.234)))
+            energy(&source).iter().zip(energy(&source.resample_rotated(Equirect::new(64, 32), 1.234)))
         {
             assert!((a - b).abs() < 1e-5 * a);
         }

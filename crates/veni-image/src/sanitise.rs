@@ -1,4 +1,4 @@
-//! Making radiance positive and finite, as the training images of the authors were.
+//! Making radiance positive and finite, as the reference implementation makes its training images.
 
 use crate::panorama::{LOG_FLOOR, Panorama};
 use crate::{Error, Result};

@@ -34,7 +34,7 @@ impl Sheet {
         Self::spaced(1, 1, [width, height], 0, BACKGROUND)
     }
 
-    /// The same with so many pixels between cells, and this colour there.
+    /// The same with `gap` pixels between cells, and this colour there.
     #[must_use]
     pub fn spaced(
         columns: usize,

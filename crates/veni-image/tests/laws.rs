@@ -98,18 +98,18 @@ fn file(format: WriteFormat, image: &Panorama) -> veni_image::Result<Panorama> {
 }
 
 #[test]
-fn shrinking_keeps_the_energy_of_any_image_at_any_size_and_turn() {
+fn shrinking_keeps_the_energy_of_any_image_at_any_size_and_rotation() {
     let inputs = || (images(radiance()), 0.0..1.0f64, 0.0..1.0f64, -7.0..7.0f64);
     let smaller = |image: &Panorama, across: f64, down: f64| {
         let side = |side: usize, share: f64| 1 + ((side - 1) as f64 * share) as usize;
         Equirect::new(side(image.grid().width, across), side(image.grid().height, down))
     };
-    holds(256, inputs(), |(image, across, down, turn)| {
-        let other = image.resample_turned(smaller(&image, across, down), turn);
+    holds(256, inputs(), |(image, across, down, angle)| {
+        let other = image.resample_rotated(smaller(&image, across, down), angle);
         close(mean(&image), mean(&other), 1e-6)
     });
-    is_found_out(256, inputs(), |(image, across, down, turn)| {
-        let other = image.resample_turned(smaller(&image, across, down), turn);
+    is_found_out(256, inputs(), |(image, across, down, angle)| {
+        let other = image.resample_rotated(smaller(&image, across, down), angle);
         close(flat_mean(&image), flat_mean(&other), 1e-6)
     });
 }
@@ -141,20 +141,20 @@ fn growing_keeps_the_energy_of_smooth_images() {
 }
 
 #[test]
-fn a_turn_is_undone_and_mirroring_reverses_it() {
+fn a_rotation_is_undone_and_mirroring_reverses_it() {
     // whole columns move pixels without touching them
     let inputs = || (images(radiance()), 0..24usize);
     let angle =
         |image: &Panorama, columns: usize| std::f64::consts::TAU * columns as f64 / image.grid().width as f64;
     holds(256, inputs(), |(image, columns)| {
         let angle = angle(&image, columns);
-        image.turn(angle).turn(-angle) == image
-            && image.turn(angle).mirror() == image.mirror().turn(-angle)
+        image.rotated(angle).rotated(-angle) == image
+            && image.rotated(angle).mirror() == image.mirror().rotated(-angle)
             && image.mirror().mirror() == image
     });
     is_found_out(256, inputs(), |(image, columns)| {
         let angle = angle(&image, columns);
-        image.turn(angle).mirror() == image.mirror().turn(angle)
+        image.rotated(angle).mirror() == image.mirror().rotated(angle)
     });
 }
 

@@ -1,4 +1,4 @@
-//! What the encoder sees of a panorama: directions, order, and what turning and rolling do.
+//! What the encoder sees of a panorama: directions, order, and what rotating and rolling do.
 
 use std::f64::consts::PI;
 
@@ -75,9 +75,9 @@ fn rolling_by_whole_stripes_permutes_bit_for_bit() {
         let image = sky(width, width / 2);
         let seen = stripes.sample(image.pixels(), image.grid());
         for k in [1, 3, 15] {
-            let rolled = image.turn(2.0 * PI * k as f64 / t as f64);
+            let rolled = image.rotated(2.0 * PI * k as f64 / t as f64);
             let other = stripes.sample(rolled.pixels(), image.grid());
-            // turned by k stripes: what stripe p saw is now seen by stripe p + k
+            // rotated by k stripes: what stripe p saw is now seen by stripe p + k
             let expected: Vec<_> = (0..t).flat_map(|q| seen[(q + t - k) % t * p..][..p].to_vec()).collect();
             assert!(other == expected, "width {width}, {k} stripes");
         }
@@ -85,22 +85,22 @@ fn rolling_by_whole_stripes_permutes_bit_for_bit() {
 }
 
 #[test]
-fn turning_the_grid_is_turning_the_panorama() {
+fn rotating_the_grid_is_rotating_the_panorama() {
     let image = sky(128, 64);
     for sampling in [StripeSampling::Exact, StripeSampling::Reference] {
         let stripes = Stripes::new(16, 128, sampling).unwrap();
         for columns in [1, 32, 100] {
             let yaw = 2.0 * PI * f64::from(columns) / 128.0;
-            let turned = image.turn(yaw);
-            let a = stripes.gather_turned(image.grid(), yaw).sample(image.pixels());
-            let b = stripes.sample(turned.pixels(), image.grid());
+            let rotated = image.rotated(yaw);
+            let a = stripes.gather_rotated(image.grid(), yaw).sample(image.pixels());
+            let b = stripes.sample(rotated.pixels(), image.grid());
             let seam = |[x, y, z]: [f32; 3], yaw: f32| {
                 let (sin, cos) = yaw.sin_cos();
                 z.abs() > 0.99 || cos * x + sin * y < -0.95 * (1.0 - z * z).sqrt()
             };
             let mut compared = 0;
             for ((a, b), d) in a.iter().zip(&b).zip(stripes.directions()) {
-                // the unwrapped seam and the poles of the reference's lookup do not turn with the grid
+                // the unwrapped seam and the poles of the reference's lookup do not rotate with the grid
                 if sampling == StripeSampling::Reference && (seam(d, 0.0) || seam(d, yaw as f32)) {
                     continue;
                 }

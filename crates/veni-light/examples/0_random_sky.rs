@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let model = Model::pretrained();
     let latent = Latent::from_seed(&model.prior(), seed);
-    println!("sky {seed} is {} numbers:", 3 * latent.vectors.len());
+    println!("sky {seed} has latent dimension {}:", 3 * latent.vectors.len());
     for [x, y, z] in &latent.vectors {
         println!("{x:8.3} {y:8.3} {z:8.3}");
     }

@@ -12,7 +12,7 @@
 //! | [`random`] | streams of random numbers that are the same on every machine |
 //! | [`cholesky`] | small dense systems of equations |
 //! | [`digest`] | content as one short name |
-//! | [`progress`] | who is told how far long work has come |
+//! | [`progress`] | the observer of long work, to which progress is reported |
 //! | [`limits`] | how large a file may be, and what it may ask for |
 //! | [`output`] | files that are written beside their target and renamed |
 //!
@@ -25,6 +25,12 @@
 //! | conditioning | what the decoder is given of the latent besides its products with the direction: rotation invariants of its vectors (condition features) | a |
 //! | field | the decoder conditioned on one latent: direction to radiance | f(d; Z) |
 //! | radiance | light per projected area and solid angle along a direction; linear Rec. 709 R, G, B, up to a factor | L, W m⁻² sr⁻¹; generated scenes: kcd/m² |
+//! | compact light | sun, moon or lamp apart from the rest: a disc, or a wider smooth glow, of given irradiance ([`light::CompactLight`]) | direction, irradiance per channel, angular radius |
+//! | lobe | smooth bump of log radiance about a direction that is added to the decoder's ([`latent::Lobe`]) | |
+//! | residual | what is left of a panorama without its compact lights ([`light::Light::residual`]) | L |
+//! | share (of a light) | its part of the light on a surface that faces it ([`light::Light::shares`]) | 0 to 1 |
+//! | prefiltered map | radiance convolved with a lobe of reflection, a level per roughness ([`light::Prefilter`]) | |
+//! | energy weight | part of a fit's weight that goes by the light of a pixel instead of its solid angle | λ, 0 to 1 |
 //! | exposure | factor between the decoder's output and radiance; a panorama's is the solid-angle-weighted mean of ln luminance | s, natural log |
 //! | irradiance | radiance times cosine, integrated over the hemisphere above a surface | E, W m⁻² |
 //! | solid angle | a pixel's part of the unit sphere, the weight in means over a panorama | ω, sr; 4π in all |

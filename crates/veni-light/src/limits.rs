@@ -8,11 +8,11 @@ use std::path::Path;
 use crate::text::decode;
 use crate::{Error, Result};
 
-/// Bytes of a model file. The paper's largest model is 88 MB; nothing bigger than this is one of ours, and a wrong path
-/// cannot fill the memory.
+/// Bytes of a model file. The paper's largest model is 88 MB; nothing bigger than this is a model of these sizes, and a
+/// wrong path cannot fill the memory.
 pub const MAX_MODEL_BYTES: u64 = 1 << 30;
 
-/// Bytes of a model file's header: names, shapes and the configuration. The largest of ours has 30 kB; a megabyte of it
+/// Bytes of a model file's header: names, shapes and the configuration. The largest shipped has 30 kB; a megabyte of it
 /// costs ten in memory.
 pub const MAX_MODEL_HEADER_BYTES: u64 = 4 << 20;
 

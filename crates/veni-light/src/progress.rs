@@ -1,4 +1,4 @@
-//! Who is told how far long work has come. The libraries print nothing.
+//! To whom the progress of long work is reported. The libraries print nothing.
 
 /// Observer of progress. Work is reported from several threads.
 pub trait Observer: Sync {

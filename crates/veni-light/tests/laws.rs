@@ -146,33 +146,33 @@ fn frames_come_back() {
     });
 }
 
-/// Turns about z are a group, mirroring is its own inverse and reverses them; each turn rounds to f32 once.
+/// Rotations about z are a group, mirroring is its own inverse and reverses them; each rotation rounds to f32 once.
 #[test]
-fn turns_and_mirrors_of_latents_are_a_group() {
+fn rotations_and_mirrors_of_latents_are_a_group() {
     let angles = || -10.0..10.0f64;
-    // coordinates below √32, each turn off by half a unit in the last place of 4 to 8: 2.4e-7
+    // coordinates below √32, each rotation off by half a unit in the last place of 4 to 8: 2.4e-7
     let tolerance = 1e-6;
     holds((latents(), angles(), angles()), |(z, a, b)| {
-        distance(&z.turned(a).turned(b), &z.turned(a + b)) < tolerance
+        distance(&z.rotated(a).rotated(b), &z.rotated(a + b)) < tolerance
     });
     is_found_out((latents(), angles(), angles()), |(z, a, b)| {
-        distance(&z.turned(a).turned(b), &z.turned(a - b)) < tolerance
+        distance(&z.rotated(a).rotated(b), &z.rotated(a - b)) < tolerance
     });
-    holds(latents(), |z| z.turned(0.0) == z && distance(&z.turned(TAU), &z) < tolerance);
-    is_found_out(latents(), |z| distance(&z.turned(0.5 * TAU), &z) < tolerance);
-    holds((latents(), angles()), |(z, a)| distance(&z.turned(a).turned(-a), &z) < tolerance);
+    holds(latents(), |z| z.rotated(0.0) == z && distance(&z.rotated(TAU), &z) < tolerance);
+    is_found_out(latents(), |z| distance(&z.rotated(0.5 * TAU), &z) < tolerance);
+    holds((latents(), angles()), |(z, a)| distance(&z.rotated(a).rotated(-a), &z) < tolerance);
     holds(latents(), |z| z.mirrored().mirrored() == z);
     is_found_out(latents(), |z| z.mirrored() == z);
     holds((latents(), angles()), |(z, a)| {
-        distance(&z.turned(a).mirrored(), &z.mirrored().turned(-a)) < tolerance
+        distance(&z.rotated(a).mirrored(), &z.mirrored().rotated(-a)) < tolerance
     });
     is_found_out((latents(), angles()), |(z, a)| {
-        distance(&z.turned(a).mirrored(), &z.mirrored().turned(a)) < tolerance
+        distance(&z.rotated(a).mirrored(), &z.mirrored().rotated(a)) < tolerance
     });
 }
 
 #[test]
-fn interpolation_reverses_and_commutes_with_turns() {
+fn interpolation_reverses_and_commutes_with_rotations() {
     let pairs = || {
         let vectors = |n| prop::collection::vec(prop::array::uniform3(-4.0..4.0f32), n);
         (1..30usize)
@@ -183,8 +183,8 @@ fn interpolation_reverses_and_commutes_with_turns() {
     // five roundings of numbers below 8: 2.4e-7 each
     let tolerance = 2e-6;
     holds(inputs(), |((a, b), t, angle)| {
-        let turned = a.turned(angle).lerp(&b.turned(angle), t).unwrap();
-        distance(&a.lerp(&b, t).unwrap().turned(angle), &turned) < tolerance
+        let rotated = a.rotated(angle).lerp(&b.rotated(angle), t).unwrap();
+        distance(&a.lerp(&b, t).unwrap().rotated(angle), &rotated) < tolerance
             && distance(&a.lerp(&b, t).unwrap(), &b.lerp(&a, 1.0 - t).unwrap()) < tolerance
     });
     is_found_out(inputs(), |((a, b), t, _)| {

@@ -255,10 +255,10 @@ mod tests {
             for cover in [0.0, 0.1, 0.3, 0.6, 0.9, 1.0] {
                 let all: Vec<_> = (0..seeds).map(|seed| share(kind, cover, seed)).collect();
                 let mean = |k: usize| all.iter().map(|s| s[k]).sum::<f32>() / seeds as f32;
-                // 16 decks of 400 features: some 0.005
+                // 16 layers of 400 features: some 0.005
                 let means = [mean(0), mean(1)];
                 assert!(means.iter().all(|m| (m - cover).abs() < 0.015), "{kind:?} {cover}: {means:?}");
-                // one deck alone: its features are few
+                // one layer alone: its features are few
                 for [one, _] in &all {
                     let (low, high) =
                         ((cover - 0.09).max(0.45 * cover), (cover + 0.09).min(1.6 * cover + 0.01));

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::atmosphere::SUN_RADIUS;
 use super::random::{Draw, Part};
-use super::stage::Stage;
+use super::scene_view::SceneView;
 use veni_light::sphere::Equirect;
 
 /// Points on a disc that is smaller than a pixel.
@@ -17,17 +17,17 @@ const POINTS_PER_PIXEL: f64 = 24.0;
 const LAMP_RADIUS: f32 = 0.14;
 
 /// Adds them to the pixels, row-major radiance.
-pub(super) fn add_discs(stage: &Stage<'_>, grid: Equirect, pixels: &mut [Vec3]) {
+pub(super) fn add_discs(view: &SceneView<'_>, grid: Equirect, pixels: &mut [Vec3]) {
     let mut splat = |direction: Vec3, illuminance: Vec3| {
         let [column, row] = grid.pixel(direction.to_array());
         let (column, row) = ((column as usize).min(grid.width - 1), (row as usize).min(grid.height - 1));
         pixels[row * grid.width + column] += illuminance / grid.solid_angle(row) as f32;
     };
-    for source in &stage.sky.sources {
-        let phase = if source.direction == stage.scene.sun_direction() {
+    for source in &view.sky.sources {
+        let phase = if source.direction == view.scene.sun_direction() {
             0.0
         } else {
-            stage.scene.moon.map_or(0.0, |m| m.phase)
+            view.scene.moon.map_or(0.0, |m| m.phase)
         };
         let points: Vec<_> = disc(source.direction, SUN_RADIUS as f32, grid, phase)
             // what lies below the horizon is already missing from the irradiance
@@ -35,27 +35,27 @@ pub(super) fn add_discs(stage: &Stage<'_>, grid: Equirect, pixels: &mut [Vec3]) 
             .collect();
         let total: f32 = points.iter().map(|p| p.1).sum();
         for (direction, weight) in points {
-            if stage.is_clear(direction, f32::INFINITY) {
-                splat(direction, source.clear * stage.sky.transmittance(direction) * weight / total);
+            if view.is_clear(direction, f32::INFINITY) {
+                splat(direction, source.clear * view.sky.transmittance(direction) * weight / total);
             }
         }
     }
-    for lamp in &stage.lamps {
-        let to = lamp.position - Vec3::Z * stage.scene.eye;
+    for lamp in &view.lamps {
+        let to = lamp.position - Vec3::Z * view.scene.eye;
         let distance = to.length();
         let illuminance = lamp.intensity / (distance * distance);
         let points: Vec<_> = disc(to / distance, (LAMP_RADIUS / distance).min(0.2), grid, 0.0).collect();
         let total: f32 = points.iter().map(|p| p.1).sum();
         for (direction, weight) in points {
-            if stage.is_clear(direction, distance) {
+            if view.is_clear(direction, distance) {
                 splat(direction, illuminance * weight / total);
             }
         }
     }
-    if stage.scene.sun_elevation < -5.0 {
-        for (direction, illuminance) in stars(stage) {
-            if stage.is_clear(direction, f32::INFINITY) {
-                splat(direction, illuminance * stage.sky.transmittance(direction));
+    if view.scene.sun_elevation < -5.0 {
+        for (direction, illuminance) in stars(view) {
+            if view.is_clear(direction, f32::INFINITY) {
+                splat(direction, illuminance * view.sky.transmittance(direction));
             }
         }
     }
@@ -83,8 +83,8 @@ fn disc(centre: Vec3, radius: f32, grid: Equirect, phase: f32) -> impl Iterator<
 
 /// Stars down to magnitude 6.5, as many of each as there are (Allen's Astrophysical Quantities: log N grows by 0.51
 /// per magnitude), evenly over the sky.
-fn stars(stage: &Stage<'_>) -> Vec<(Vec3, Vec3)> {
-    let mut draw = Draw::new(stage.scene.seed, stage.scene.index, Part::Stars);
+fn stars(view: &SceneView<'_>) -> Vec<(Vec3, Vec3)> {
+    let mut draw = Draw::new(view.scene.seed, view.scene.index, Part::Stars);
     (0..4000)
         .map(|_| {
             let magnitude = 6.5 + draw.unit().max(1e-4).log10() / 0.51;

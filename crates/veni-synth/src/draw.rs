@@ -1,7 +1,8 @@
 //! The distribution of scenes.
 //!
-//! Weather, time of day and place are drawn first, everything else given these. The shares were set by hand so that
-//! statistics of log radiance agree with those of photographed outdoor panoramas (`docs/RESULTS.md`, Synthetic skies).
+//! Weather, time of day and setting are drawn first, everything else given these. The shares were set by hand so that
+//! statistics of log radiance agree with those of photographed outdoor panoramas (docs/results/synthetic.md,
+//! "Photographed and generated scenes").
 
 mod clouds;
 mod land;
@@ -10,7 +11,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::random::{Draw, Part};
-use super::scene::{Moon, Place, Scene, SkyKind};
+use super::scene::{Moon, Scene, Setting, SkyKind};
 use super::view::sun_in_view;
 use clouds::clouds;
 use land::{ground, ridges};
@@ -24,7 +25,8 @@ pub struct Overrides {
     /// Weather or time of day.
     pub sky: Option<SkyKind>,
     /// What stands around the viewer.
-    pub place: Option<Place>,
+    #[serde(rename = "place")]
+    pub setting: Option<Setting>,
     /// Elevation of the sun, degrees.
     pub sun_elevation: Option<f32>,
     /// Azimuth of the sun, degrees from +x towards +y.
@@ -74,22 +76,22 @@ impl Scene {
             (0.10, SkyKind::Night),
         ]);
         let sky = overrides.sky.unwrap_or(sky);
-        let place = draw.weighted(&[
-            (0.21, Place::PureSky),
-            (0.12, Place::Plain),
-            (0.08, Place::Hills),
-            (0.04, Place::Coast),
-            (0.04, Place::Lake),
-            (0.10, Place::Park),
-            (0.07, Place::Forest),
-            (0.06, Place::Village),
-            (0.08, Place::Street),
-            (0.12, Place::Square),
-            (0.02, Place::Courtyard),
-            (0.03, Place::Rocks),
-            (0.03, Place::Shelter),
+        let setting = draw.weighted(&[
+            (0.21, Setting::PureSky),
+            (0.12, Setting::Plain),
+            (0.08, Setting::Hills),
+            (0.04, Setting::Coast),
+            (0.04, Setting::Lake),
+            (0.10, Setting::Park),
+            (0.07, Setting::Forest),
+            (0.06, Setting::Village),
+            (0.08, Setting::Street),
+            (0.12, Setting::Square),
+            (0.02, Setting::Courtyard),
+            (0.03, Setting::Rocks),
+            (0.03, Setting::Shelter),
         ]);
-        let place = overrides.place.unwrap_or(place);
+        let setting = overrides.setting.unwrap_or(setting);
         let elevation = elevation(draw, sky);
         let sun_elevation = overrides.sun_elevation.unwrap_or(elevation);
         let azimuth = draw.azimuth().to_degrees();
@@ -97,16 +99,18 @@ impl Scene {
         let turbidity = (if sky == SkyKind::Overcast { 4.0 } else { 2.45 } * haze).clamp(1.7, 9.0);
         let clouds = clouds(draw, sky, overrides.cloud_cover);
         let moon = moon(draw, sun_elevation);
-        let settled =
-            matches!(place, Place::Street | Place::Square | Place::Courtyard | Place::Village | Place::Park);
+        let settled = matches!(
+            setting,
+            Setting::Street | Setting::Square | Setting::Courtyard | Setting::Village | Setting::Park
+        );
         let glow = draw.log_range(5e-7, 2e-4) * if settled { 3.0 } else { 0.5 };
         let warm = draw.range(0.0, 1.0);
-        let mut ground = ground(draw, place);
+        let mut ground = ground(draw, setting);
         if let Some(albedo) = overrides.ground_albedo {
             ground.tone = 1.0;
             ground.tone = albedo / veni_image::luminance(ground.albedo()).max(1e-4);
         }
-        let ridges = ridges(draw, place, &ground);
+        let ridges = ridges(draw, setting, &ground);
         // what the camera leaves of a coloured cast: it takes the light of noon as white, more or less
         let cast = draw.normal(-0.28, 0.17);
         let tint = draw.normal(0.0, 0.03);
@@ -122,9 +126,9 @@ impl Scene {
             moon,
             clouds,
             glow: (glow * Vec3::new(1.3, 0.85, 0.4).lerp(Vec3::new(1.0, 0.95, 0.85), warm)).to_array(),
-            place,
+            setting,
             fullness: draw.unit().powf(0.7),
-            eye: eye(draw, place),
+            eye: eye(draw, setting),
             ground,
             ridges,
             lit: sun_elevation < 0.5 && (settled || draw.chance(0.3)),
@@ -178,11 +182,11 @@ fn moon(draw: &mut Draw, sun_elevation: f32) -> Option<Moon> {
     (up && sun_elevation < -8.0).then_some(moon)
 }
 
-fn eye(draw: &mut Draw, place: Place) -> f32 {
+fn eye(draw: &mut Draw, setting: Setting) -> f32 {
     let (low, high, raised) = (draw.range(1.2, 2.0), draw.log_range(3.0, 25.0), draw.unit());
-    let often = match place {
-        Place::Hills | Place::Coast => 0.25,
-        Place::Plain => 0.15,
+    let often = match setting {
+        Setting::Hills | Setting::Coast => 0.25,
+        Setting::Plain => 0.15,
         _ => 0.0,
     };
     if raised < often { high } else { low }

@@ -1,4 +1,4 @@
-//! From a place to the things that stand there.
+//! From a setting to the things that stand there.
 
 mod houses;
 mod lamps;
@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 
 use super::material::Material;
 use super::random::{Draw, Part};
-use super::scene::{Place, Scene};
+use super::scene::{Scene, Setting};
 use super::solid::{Shape, Solid};
 
 /// Leaves overhead, as a layer with holes.
@@ -57,11 +57,11 @@ pub(super) fn layout(scene: &Scene) -> Layout {
         bearing: Vec2::from_angle(scene.ground.bearing.to_radians()),
         layout: Layout::default(),
     };
-    builder.place(scene.place, scene.fullness);
+    builder.place(scene.setting, scene.fullness);
     // under a pure sky there is no ground that lamps could stand on
-    if scene.lit && scene.place != Place::PureSky {
+    if scene.lit && scene.setting != Setting::PureSky {
         builder.distant_lamps();
-        builder.street_light(scene.place);
+        builder.street_light(scene.setting);
     }
     // a wall or crown may have come to stand where the viewer is
     builder.layout.solids.retain(|s| !covers_eye(s, scene.eye));
@@ -77,32 +77,32 @@ struct Builder {
 }
 
 impl Builder {
-    fn place(&mut self, place: Place, fullness: f32) {
+    fn place(&mut self, setting: Setting, fullness: f32) {
         let many = |least: f32, most: f32| (least + (most - least) * fullness) as usize;
-        match place {
-            Place::PureSky => return,
-            Place::Plain | Place::Coast | Place::Hills => {
+        match setting {
+            Setting::PureSky => return,
+            Setting::Plain | Setting::Coast | Setting::Hills => {
                 if self.draw.chance(0.7 * fullness) {
                     self.trees(many(1.0, 14.0), 6.0, 60.0);
                 }
                 if self.draw.chance(fullness) {
                     self.bushes(many(2.0, 20.0), 4.0, 40.0);
                 }
-                if place != Place::Plain && self.draw.chance(0.6) {
+                if setting != Setting::Plain && self.draw.chance(0.6) {
                     self.boulders(many(2.0, 16.0), 2.5, 25.0, 0.9);
                 }
                 if self.draw.chance(0.12) {
                     self.houses(1, 15.0, 50.0);
                 }
             }
-            Place::Lake => {
+            Setting::Lake => {
                 // on the dry side only
                 self.trees(many(4.0, 26.0), 8.0, 50.0);
                 self.bushes(many(4.0, 24.0), 4.0, 30.0);
                 let shore = self.bearing;
                 self.layout.solids.retain(|s| middle(s).dot(shore) < 1.0);
             }
-            Place::Park => {
+            Setting::Park => {
                 self.trees(many(6.0, 40.0), 3.5, 60.0);
                 self.bushes(many(0.0, 16.0), 4.0, 40.0);
                 if self.draw.chance(0.3) {
@@ -110,22 +110,22 @@ impl Builder {
                 }
                 self.lamp_posts(many(1.0, 4.0), 6.0, 30.0);
             }
-            Place::Forest => self.forest(fullness),
-            Place::Village => {
+            Setting::Forest => self.forest(fullness),
+            Setting::Village => {
                 self.houses(many(3.0, 10.0), 10.0, 45.0);
                 self.trees(many(3.0, 18.0), 4.0, 50.0);
                 self.bushes(many(2.0, 16.0), 4.0, 30.0);
                 self.lamp_posts(2, 6.0, 25.0);
             }
-            Place::Street => self.street(fullness),
-            Place::Square => {
+            Setting::Street => self.street(fullness),
+            Setting::Square => {
                 let radius = self.draw.log_range(14.0, 45.0);
                 self.ring(radius, [7.0, 26.0], 0.92);
                 self.trees(many(0.0, 8.0), 6.0, 0.7 * radius);
                 self.vehicles(many(0.0, 8.0), 5.0, 0.7 * radius);
                 self.lamp_posts(many(3.0, 9.0), 5.0, 0.8 * radius);
             }
-            Place::Courtyard => {
+            Setting::Courtyard => {
                 let radius = self.draw.log_range(4.0, 12.0);
                 self.ring(radius, [4.0, 16.0], 0.97);
                 self.bushes(many(0.0, 6.0), 2.0, 0.8 * radius);
@@ -134,7 +134,7 @@ impl Builder {
                 }
                 self.lamp_posts(2, 2.0, 0.8 * radius);
             }
-            Place::Rocks => {
+            Setting::Rocks => {
                 self.boulders(many(14.0, 60.0), 2.0, 30.0, 2.2);
                 let walls = self.draw.count(0, 4);
                 for _ in 0..walls {
@@ -142,10 +142,10 @@ impl Builder {
                 }
                 self.bushes(many(0.0, 12.0), 4.0, 30.0);
             }
-            Place::Shelter => self.shelter(fullness),
+            Setting::Shelter => self.shelter(fullness),
         }
         // something close by, as in most photographs
-        if self.draw.chance(0.25 * fullness) && !matches!(place, Place::Plain | Place::Shelter) {
+        if self.draw.chance(0.25 * fullness) && !matches!(setting, Setting::Plain | Setting::Shelter) {
             self.trees(1, 2.2, 5.0);
         }
     }

@@ -10,7 +10,7 @@
 //! | sun and moon | limb-darkened discs of true solid angle and radiance, integrated over pixels |
 //! | clouds | [`CloudLayer`]s of fractal density, ray-marched (cumulus) or thin (stratus), lit by sun, sky and ground |
 //! | hills, mountains, woods, towns | [`Ridge`]s, behind air |
-//! | trees, houses, rocks, walls, cars, lamps | solids around the viewer with shadows, by [`Place`] |
+//! | trees, houses, rocks, walls, cars, lamps | solids around the viewer with shadows, by [`Setting`] |
 //! | ground | [`Surface`]s in a [`Pattern`]; water with waves, Fresnel reflection and glitter |
 //! | night | moonlight, stars, airglow, street lamps, windows, the glow of towns |
 //!
@@ -41,10 +41,10 @@ mod noise;
 mod random;
 mod render;
 mod scene;
+mod scene_view;
 mod sky;
 mod solid;
 mod spectrum;
-mod stage;
 mod surface;
 mod terrain;
 mod view;
@@ -60,5 +60,5 @@ pub use cloud_layer::{CloudKind, CloudLayer};
 pub use draw::Overrides;
 pub use generate::generate;
 pub use render::render;
-pub use scene::{Moon, Place, Ridge, RidgeKind, Scene, SkyKind};
+pub use scene::{Moon, Ridge, RidgeKind, Scene, Setting, SkyKind};
 pub use surface::{Ground, Pattern, Surface};

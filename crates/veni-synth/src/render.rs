@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::disc::add_discs;
 use super::noise::cell;
 use super::scene::Scene;
-use super::stage::Stage;
+use super::scene_view::SceneView;
 use veni_image::Panorama;
 use veni_light::sphere::Equirect;
 
@@ -24,35 +24,41 @@ const FLOOR: f32 = 4e-9;
 /// Radiance of a scene in kcd/m² (linear Rec. 709) on a panorama's grid; z is up. A function of the scene and the grid:
 /// threads change nothing.
 pub fn render(scene: &Scene, grid: Equirect) -> Panorama {
-    let stage = Stage::new(scene);
+    let view = SceneView::new(scene);
     let mut pixels = vec![Vec3::ZERO; grid.len()];
     pixels.par_chunks_mut(grid.width).enumerate().for_each(|(row, pixels)| {
         for (column, pixel) in pixels.iter_mut().enumerate() {
-            *pixel = sample(&stage, grid, column, row);
+            *pixel = sample(&view, grid, column, row);
         }
     });
-    add_discs(&stage, grid, &mut pixels);
+    add_discs(&view, grid, &mut pixels);
     let white = Vec3::from(scene.white);
     Panorama::new(grid, pixels.into_iter().map(|p| (p * white).max(Vec3::splat(FLOOR)).to_array()).collect())
 }
 
 /// The mean radiance of a pixel.
-fn sample(stage: &Stage<'_>, grid: Equirect, column: usize, row: usize) -> Vec3 {
+fn sample(view: &SceneView<'_>, grid: Equirect, column: usize, row: usize) -> Vec3 {
     let (mut sum, mut low, mut high) = (Vec3::ZERO, f32::INFINITY, 0f32);
-    visit(stage, grid, [column, row], COARSE, |radiance| {
-        let level = Stage::level(radiance);
+    visit(view, grid, [column, row], COARSE, |radiance| {
+        let level = SceneView::level(radiance);
         (low, high) = (low.min(level), high.max(level));
         sum += radiance;
     });
     if high <= CONTRAST * low {
         return sum / (COARSE * COARSE) as f32;
     }
-    visit(stage, grid, [column, row], FINE, |radiance| sum += radiance);
+    visit(view, grid, [column, row], FINE, |radiance| sum += radiance);
     sum / (COARSE * COARSE + FINE * FINE) as f32
 }
 
 /// Calls `take` with the radiance of n × n samples spread over a pixel, each at random in its own cell.
-fn visit(stage: &Stage<'_>, grid: Equirect, [column, row]: [usize; 2], n: usize, mut take: impl FnMut(Vec3)) {
+fn visit(
+    view: &SceneView<'_>,
+    grid: Equirect,
+    [column, row]: [usize; 2],
+    n: usize,
+    mut take: impl FnMut(Vec3),
+) {
     let footprint = PI / grid.height as f32 / n as f32;
     for k in 0..n * n {
         let key = (row * grid.width + column) as i32;
@@ -62,6 +68,6 @@ fn visit(stage: &Stage<'_>, grid: Equirect, [column, row]: [usize; 2], n: usize,
         let (sin_p, cos_p) = (PI - 2.0 * PI * u / grid.width as f32).sin_cos();
         let (sin_t, cos_t) = (PI * v / grid.height as f32).sin_cos();
         let direction = Vec3::new(sin_t * cos_p, sin_t * sin_p, cos_t);
-        take(stage.radiance(direction, footprint, random(3)));
+        take(view.radiance(direction, footprint, random(3)));
     }
 }

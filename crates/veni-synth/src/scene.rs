@@ -32,8 +32,9 @@ pub struct Scene {
     /// Radiance of the lights of towns at the horizon, kcd/m².
     pub glow: [f32; 3],
     /// Where the viewer stands.
-    pub place: Place,
-    /// How full of things the place is, 0 to 1.
+    #[serde(rename = "place")]
+    pub setting: Setting,
+    /// How full of things the setting is, 0 to 1.
     pub fullness: f32,
     /// Height of the eye above the ground.
     pub eye: f32,
@@ -82,7 +83,7 @@ impl SkyKind {
 /// What stands around the viewer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Place {
+pub enum Setting {
     /// Nothing but sky; below the horizon its blurred mirror image, as in the many published panoramas from which the
     /// ground was removed.
     PureSky,
@@ -112,7 +113,7 @@ pub enum Place {
     Shelter,
 }
 
-impl Place {
+impl Setting {
     /// All of them.
     pub const ALL: [Self; 13] = [
         Self::PureSky,

@@ -10,7 +10,7 @@ const SMALL: Equirect = Equirect { width: 32, height: 16 };
 fn clear(elevation: f32) -> Scene {
     let overrides = Overrides {
         sky: Some(SkyKind::Clear),
-        place: Some(Place::Plain),
+        setting: Some(Setting::Plain),
         sun_elevation: Some(elevation),
         sun_azimuth: Some(40.0),
         turbidity: Some(2.5),
@@ -43,8 +43,8 @@ fn a_scene_is_a_function_of_seed_and_index_whatever_the_threads() {
     for (seed, index) in [(5, 12), (6, 11)] {
         assert_ne!(first, render(&Scene::draw(seed, index, &overrides), SMALL));
     }
-    for place in Place::ALL {
-        assert_eq!(serde_json::to_value(place).unwrap(), place.name());
+    for setting in Setting::ALL {
+        assert_eq!(serde_json::to_value(setting).unwrap(), setting.name());
     }
     for sky in SkyKind::ALL {
         assert_eq!(serde_json::to_value(sky).unwrap(), sky.name());
@@ -55,19 +55,19 @@ fn a_scene_is_a_function_of_seed_and_index_whatever_the_threads() {
     assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), scene);
     // what is fixed is kept, and the rest stays as it was
     let overrides = Overrides { sun_azimuth: Some(12.0), turbidity: Some(4.0), ..overrides };
-    let turned = Scene::draw(5, 11, &overrides);
-    assert_eq!((turned.sun_azimuth, turned.turbidity), (12.0, 4.0));
-    assert_eq!(turned, Scene { sun_azimuth: 12.0, turbidity: 4.0, ..scene });
+    let other = Scene::draw(5, 11, &overrides);
+    assert_eq!((other.sun_azimuth, other.turbidity), (12.0, 4.0));
+    assert_eq!(other, Scene { sun_azimuth: 12.0, turbidity: 4.0, ..scene });
 }
 
 #[test]
 fn every_kind_of_scene_is_positive_and_finite() {
-    let count = Place::ALL.len() * SkyKind::ALL.len();
+    let count = Setting::ALL.len() * SkyKind::ALL.len();
     let mut ranges = Vec::new();
     for k in 0..count {
         let overrides = Overrides {
             sky: Some(SkyKind::ALL[k % SkyKind::ALL.len()]),
-            place: Some(Place::ALL[k / SkyKind::ALL.len()]),
+            setting: Some(Setting::ALL[k / SkyKind::ALL.len()]),
             ..Overrides::default()
         };
         let panorama = render(&Scene::draw(1, k as u64, &overrides), SMALL);
@@ -83,7 +83,7 @@ fn every_kind_of_scene_is_positive_and_finite() {
 
 /// Scenes of one weather on an empty plain, with the camera's white balance off.
 fn under(sky: SkyKind, count: u64) -> impl Iterator<Item = Scene> {
-    let overrides = Overrides { sky: Some(sky), place: Some(Place::Plain), ..Overrides::default() };
+    let overrides = Overrides { sky: Some(sky), setting: Some(Setting::Plain), ..Overrides::default() };
     (0..count).map(move |index| {
         let scene = Scene::draw(31, index, &overrides);
         Scene { ridges: Vec::new(), fullness: 0.0, white: [1.0; 3], lit: false, ..scene }
@@ -133,29 +133,30 @@ fn the_light_of_every_weather_is_that_of_light_meters() {
 #[test]
 fn every_place_shows_as_much_sky_as_its_name_says() {
     // the mean share of the upper half space that is open, and the least of 24 scenes
-    let expected = |place| match place {
-        Place::PureSky => (1.0..1.01, 1.0),
-        Place::Plain | Place::Coast => (0.85..0.97, 0.4),
-        Place::Hills => (0.68..0.85, 0.4),
-        Place::Lake => (0.75..0.92, 0.4),
-        Place::Park | Place::Village | Place::Rocks => (0.62..0.85, 0.2),
-        Place::Square => (0.45..0.68, 0.15),
-        Place::Street => (0.33..0.55, 0.05),
-        Place::Courtyard => (0.25..0.5, 0.02),
-        Place::Shelter => (0.1..0.35, 0.0),
-        Place::Forest => (0.0..0.1, 0.0),
+    let expected = |setting| match setting {
+        Setting::PureSky => (1.0..1.01, 1.0),
+        Setting::Plain | Setting::Coast => (0.85..0.97, 0.4),
+        Setting::Hills => (0.68..0.85, 0.4),
+        Setting::Lake => (0.75..0.92, 0.4),
+        Setting::Park | Setting::Village | Setting::Rocks => (0.62..0.85, 0.2),
+        Setting::Square => (0.45..0.68, 0.15),
+        Setting::Street => (0.33..0.55, 0.05),
+        Setting::Courtyard => (0.25..0.5, 0.02),
+        Setting::Shelter => (0.1..0.35, 0.0),
+        Setting::Forest => (0.0..0.1, 0.0),
     };
-    for place in Place::ALL {
-        let overrides = Overrides { sky: Some(SkyKind::Cloudy), place: Some(place), ..Overrides::default() };
+    for setting in Setting::ALL {
+        let overrides =
+            Overrides { sky: Some(SkyKind::Cloudy), setting: Some(setting), ..Overrides::default() };
         let shares: [f32; 24] = std::array::from_fn(|index| {
             let scene = Scene::draw(32, index as u64, &overrides);
-            let stage = stage::Stage::new(&scene);
-            let open = sky::spiral(400).filter(|d| stage.is_clear(*d, f32::INFINITY)).count();
+            let view = scene_view::SceneView::new(&scene);
+            let open = sky::spiral(400).filter(|d| view.is_clear(*d, f32::INFINITY)).count();
             open as f32 / 400.0
         });
         let (mean, least) = (shares.iter().sum::<f32>() / 24.0, shares.iter().fold(1f32, |a, b| a.min(*b)));
-        let (range, low) = expected(place);
-        assert!(range.contains(&mean) && least >= low, "{place:?}: {mean}, {least} at least");
+        let (range, low) = expected(setting);
+        assert!(range.contains(&mean) && least >= low, "{setting:?}: {mean}, {least} at least");
     }
 }
 
@@ -167,7 +168,7 @@ fn the_sun_is_drawn_where_any_scene_says_it_is() {
         let (azimuth, elevation) = (127.0 * k as f32 % 360.0, 3.0 + 83.0 * k as f32 / 47.0);
         let overrides = Overrides {
             sky: Some(SkyKind::Clear),
-            place: Some(Place::PureSky),
+            setting: Some(Setting::PureSky),
             sun_elevation: Some(elevation),
             sun_azimuth: Some(azimuth),
             cloud_cover: Some(0.0),
@@ -191,15 +192,15 @@ fn the_sun_is_drawn_where_any_scene_says_it_is() {
             "{azimuth}°, {elevation}°: {across} {down}"
         );
         // the disc's energy in the pixels is that of the source
-        let stage = stage::Stage::new(&scene);
+        let view = scene_view::SceneView::new(&scene);
         let mut pixels = vec![glam::Vec3::ZERO; grid.len()];
-        disc::add_discs(&stage, grid, &mut pixels);
+        disc::add_discs(&view, grid, &mut pixels);
         let energy = pixels
             .iter()
             .enumerate()
             .map(|(k, p)| f64::from(luminance(p.to_array())) * grid.solid_angle(k / 64));
         let (energy, source) =
-            (energy.sum::<f64>(), f64::from(luminance(stage.sky.sources[0].clear.to_array())));
+            (energy.sum::<f64>(), f64::from(luminance(view.sky.sources[0].clear.to_array())));
         assert!(
             (energy - source).abs() < 1e-3 * source,
             "{azimuth}°, {elevation}°: {energy} of {source} klx"
@@ -235,9 +236,9 @@ fn the_sun_is_where_it_was_asked_for_with_its_energy_at_any_size() {
         assert!(cosine > 0.997, "{direction:?} for {towards:?}");
     }
     // the disc resolved has the radiance that a sun of 6.8e-5 sr must have
-    let (stage, fine) = (stage::Stage::new(&scene), Equirect::new(4096, 2048));
+    let (view, fine) = (scene_view::SceneView::new(&scene), Equirect::new(4096, 2048));
     let mut pixels = vec![glam::Vec3::ZERO; fine.len()];
-    disc::add_discs(&stage, fine, &mut pixels);
+    disc::add_discs(&view, fine, &mut pixels);
     let (mut solid, mut energy, mut middle) = (0.0, 0.0, 0.0f64);
     for (k, pixel) in pixels.iter().enumerate().filter(|(_, p)| p.y > 0.0) {
         let (y, angle) = (f64::from(luminance(pixel.to_array())), fine.solid_angle(k / fine.width));
@@ -246,7 +247,7 @@ fn the_sun_is_where_it_was_asked_for_with_its_energy_at_any_size() {
     // pixels on the border are lit in part; the mean of a limb-darkened disc is 0.8 of its middle
     assert!((6.8e-5..1.05e-4).contains(&solid), "{solid} sr");
     assert!((middle * 0.8 * 6.8e-5 - energy).abs() < 0.15 * energy, "{middle} kcd/m² for {energy} klx");
-    let source = f64::from(luminance(stage.sky.sources[0].clear.to_array()));
+    let source = f64::from(luminance(view.sky.sources[0].clear.to_array()));
     assert!((energy - source).abs() < 1e-3 * source, "{energy} of {source} klx");
     // cloud takes it away
     let overcast = Scene::draw(
@@ -255,14 +256,15 @@ fn the_sun_is_where_it_was_asked_for_with_its_energy_at_any_size() {
         &Overrides { sky: Some(SkyKind::Overcast), sun_elevation: Some(35.0), ..Overrides::default() },
     );
     let overcast =
-        Scene { sun_azimuth: 40.0, ridges: Vec::new(), fullness: 0.0, place: Place::Plain, ..overcast };
+        Scene { sun_azimuth: 40.0, ridges: Vec::new(), fullness: 0.0, setting: Setting::Plain, ..overcast };
     assert!(near_sun(Equirect::new(64, 32), &overcast).0 < 0.1 * sizes[0].0);
 }
 
 #[test]
 fn a_hidden_sun_is_moved_to_where_it_is_in_view() {
-    let clear = Overrides { place: Some(Place::Square), sky: Some(SkyKind::Clear), ..Overrides::default() };
-    let in_view = |s: &Scene| stage::Stage::new(s).is_clear(s.sun_direction(), f32::INFINITY);
+    let clear =
+        Overrides { setting: Some(Setting::Square), sky: Some(SkyKind::Clear), ..Overrides::default() };
+    let in_view = |s: &Scene| scene_view::SceneView::new(s).is_clear(s.sun_direction(), f32::INFINITY);
     let mut moved = 0;
     for index in 0..40 {
         let up = Scene::draw(4, index, &Overrides { sun_elevation: Some(18.0), ..clear });

@@ -6,13 +6,13 @@
 
 mod images;
 mod light;
+pub mod monitor;
 pub mod mutate;
 #[cfg(feature = "onnx")]
 mod network;
 mod obj;
 #[cfg(feature = "learn")]
 mod runs;
-pub mod watch;
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};

@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use veni_fuzz_targets::monitor::{Clock, Tally, note_panics};
 use veni_fuzz_targets::mutate::Mutator;
-use veni_fuzz_targets::watch::{Clock, Tally, watch};
 use veni_fuzz_targets::{Target, corpus, target, targets};
 
 fn main() {
@@ -36,7 +36,7 @@ fn inputs(target: &Target) -> Vec<Vec<u8>> {
 
 fn fuzz(target: &Target, seconds: u64, seed: u64, keep: Option<PathBuf>) -> Value {
     let (clock, mut tally) = (Clock::start(target.name), Tally::default());
-    watch();
+    note_panics();
     let inputs = inputs(target);
     let end = Instant::now() + Duration::from_secs(seconds);
     inputs.iter().for_each(|data| tally.run(target, data, Some(&clock), keep.as_deref()));

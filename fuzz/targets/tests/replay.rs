@@ -5,8 +5,8 @@
 
 use std::time::{Duration, Instant};
 
+use veni_fuzz_targets::monitor::{Clock, LONGEST, Tally, note_panics};
 use veni_fuzz_targets::mutate::Mutator;
-use veni_fuzz_targets::watch::{Clock, LONGEST, Tally, watch};
 use veni_fuzz_targets::{PIXELS, Target, corpus, on_disk, targets};
 
 /// Mutations of each target, and the time after which a slow machine runs fewer.
@@ -36,7 +36,7 @@ fn replay(target: &Target) -> Tally {
 
 #[test]
 fn nothing_panics_hangs_or_fills_the_memory() {
-    watch();
+    note_panics();
     // the check must be able to fail: a panic is noted though it is caught, as readers do with a damaged EXR file
     let broken = Target { name: "broken", run: |_| panic!("on purpose"), ..targets()[0] };
     let caught = Target { run: |_| std::panic::catch_unwind(|| panic!("unseen")).is_ok(), ..broken };

@@ -48,7 +48,7 @@ fn main() -> Result<(), Error> {
     let (dimension, skies): (usize, u64) = (dimension.parse()?, skies.parse()?);
     let grid = Equirect::new(width, width / 2);
     if width % 64 != 0 {
-        return Err(format!("{width} is no multiple of 64").into());
+        return Err(format!("{width} is not a multiple of 64").into());
     }
     let model = Model::pretrained_of(dimension).ok_or("no embedded model of this dimension")?;
     let mut latents: Vec<_> =

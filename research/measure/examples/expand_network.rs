@@ -1,7 +1,7 @@
 //! How long a network takes to expand an LDR panorama, and how much memory.
 //!
 //! ```text
-//! cargo run --release -p veni-core --no-default-features --features onnx --example expand_network -- [CHANNELS [LAYERS]]
+//! cargo run --release -p veni-research --features onnx --example expand_network -- [CHANNELS [LAYERS]]
 //! ```
 //! The network is made here, of random weights: LAYERS convolutions of 3 × 3 with CHANNELS channels between a first and a
 //! last one (32 and 4 unless given), and a softplus. It sees the panorama at its own 1024 × 512 (and what is beyond its

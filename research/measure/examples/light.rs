@@ -1,8 +1,8 @@
 //! What a fit that weighs pixels by their light gains, and what it costs:
-//! `cargo run --release -p veni-research --example light -- MODEL FOLDER FACTOR [SHARE …]`.
+//! `cargo run --release -p veni-research --example light -- MODEL FOLDER FACTOR [WEIGHT …]`.
 //!
 //! Each panorama of FOLDER, at 128 × 64, is fitted on means of FACTOR × FACTOR pixels (1, 2 or 4) from the encoder's latent
-//! with the model's own prior, once per share of the weight that goes by light (`Objective::Energy`; 0 is the plain squared
+//! with the model's own prior, once per energy weight (`Objective::Energy`; 0 is the plain squared
 //! error of log radiance). Irradiance is that of surfaces facing 26 ways; its error is √⟨(ln E − ln E_true)²⟩ over the ways,
 //! without any alignment.
 
@@ -30,30 +30,30 @@ fn main() -> Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     let usage = || {
         Error::invalid(
-            "usage: light MODEL FOLDER FACTOR [SHARE …], FACTOR 1, 2 or 4, shares in 0..=1 [0 0.05 0.1 0.2 0.4]",
+            "usage: light MODEL FOLDER FACTOR [WEIGHT …], FACTOR 1, 2 or 4, energy weights in 0..=1 [0 0.05 0.1 0.2 0.4]",
         )
     };
-    let [model, folder, factor, shares @ ..] = arguments.as_slice() else { return Err(usage()) };
+    let [model, folder, factor, weights @ ..] = arguments.as_slice() else { return Err(usage()) };
     let factor = factor.parse().ok().filter(|f| [1, 2, 4].contains(f)).ok_or_else(usage)?;
-    let mut shares: Vec<f64> =
-        shares.iter().map(|s| s.parse().map_err(|_| usage())).collect::<Result<_>>()?;
-    if shares.is_empty() {
-        shares = vec![0.0, 0.05, 0.1, 0.2, 0.4];
+    let mut weights: Vec<f64> =
+        weights.iter().map(|s| s.parse().map_err(|_| usage())).collect::<Result<_>>()?;
+    if weights.is_empty() {
+        weights = vec![0.0, 0.05, 0.1, 0.2, 0.4];
     }
     let model = Model::load(Path::new(model))?;
     let set = Dataset::load(&panorama_files(Path::new(folder), &Silent)?, GRID)?;
-    println!("| share | LDR PSNR | HDR PSNR | log RMSE | sun | irradiance |");
+    println!("| energy weight | LDR PSNR | HDR PSNR | log RMSE | sun | irradiance |");
     println!("|---|---|---|---|---|---|");
-    for share in shares {
+    for weight in weights {
         let all = set
             .items()
             .iter()
-            .map(|item| look(&model, &item.log_radiance, factor, share))
+            .map(|item| look(&model, &item.log_radiance, factor, weight))
             .collect::<Result<Vec<_>>>()?;
         let mean = |f: &dyn Fn(&Look) -> f64| all.iter().map(f).sum::<f64>() / all.len() as f64;
         let suns: Vec<_> = all.iter().filter_map(|look| look.sun).collect();
         println!(
-            "| {share} | {:.2} | {:.2} | {:.3} | {:.1}° | {:.3} |",
+            "| {weight} | {:.2} | {:.2} | {:.3} | {:.1}° | {:.3} |",
             mean(&|l| l.ldr_psnr),
             mean(&|l| l.hdr_psnr),
             mean(&|l| l.log_error),
@@ -72,14 +72,14 @@ struct Look {
     irradiance: f64,
 }
 
-fn look(model: &Model, image: &[f32], factor: usize, share: f64) -> Result<Look> {
+fn look(model: &Model, image: &[f32], factor: usize, weight: f64) -> Result<Look> {
     let veni = Veni::from_model(model, &Device::flex())?;
     let start: Vec<_> = veni.encode(GRID, &[image])?.into_iter().map(|e| Latent::new(e.vectors)).collect();
     let (decoder, prior) = (model.decoder()?, model.prior());
     let coarse = averaged(GRID, image, factor);
     let images = [coarse.as_slice()];
     let target = FitTarget::panoramas(coarse_grid(GRID, factor), &images)?.with_prior(&prior);
-    let objective = if share > 0.0 { Objective::Energy { share } } else { Objective::LogError };
+    let objective = if weight > 0.0 { Objective::Energy { weight } } else { Objective::LogError };
     let prior_weight = FitConfig::prior_for(start[0].vectors.len());
     let config = FitConfig { objective, prior: prior_weight, ..FitConfig::thorough() };
     let found = fit(FitDecoder::from(&decoder), &target, &start, &config)?;

@@ -17,8 +17,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (at, input) in inputs.iter().enumerate() {
         let picture = image::open(input)?.to_rgb8();
         let [width, height] = [picture.width(), picture.height()].map(|side| side as usize);
-        let sheet =
-            sheet.get_or_insert_with(|| (Sheet::new(columns, inputs.len().div_ceil(columns), width, height), [width, height]));
+        let sheet = sheet.get_or_insert_with(|| {
+            (Sheet::new(columns, inputs.len().div_ceil(columns), width, height), [width, height])
+        });
         if sheet.1 != [width, height] {
             return Err(format!("{input}: {width} x {height}, the first is {:?}", sheet.1).into());
         }

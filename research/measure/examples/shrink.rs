@@ -1,7 +1,7 @@
 //! Brings panoramas of any size to a small one, as half-precision EXR files, and shows them on one sheet.
 //!
 //! ```text
-//! cargo run --release -p veni-core --no-default-features --example shrink -- WIDTH OUT_FOLDER IN.exr…
+//! cargo run --release -p veni-research --example shrink -- WIDTH OUT_FOLDER IN.exr…
 //! ```
 //! The panoramas in `assets/panoramas` were made this way with WIDTH 128. `OUT_FOLDER/sheet.png` is the sheet.
 

@@ -46,7 +46,7 @@ const DEVICES: &str = "Devices: a graphics card bakes the same picture as the CP
         veni-cli bake --seed 7 -o sky.exr -o sky.png --size 4096\n  \
         veni-cli bake --seed 7 -o noon.exr --sun 120,55 --overcast 0.2\n  \
         veni-cli bake --seed 7 -o dusk.exr --date 2026-06-21T20:30+02:00 --place 48.1,11.6\n  \
-        veni-cli bake sky.exr -o turned.exr --turn 90 --exposure -1\n  \
+        veni-cli bake sky.exr -o rotated.exr --turn 90 --exposure -1\n  \
         {}veni-cli bake sky.json -o cube.exr --layout cubemap --frame bevy --size 512\n  \
         veni-cli bake latents/*.json --out-dir skies --format exr,png\n  \
         veni-cli bake --seed 0 --count 1000 --out-dir skies --shard 2/4    the second of four processes{}",

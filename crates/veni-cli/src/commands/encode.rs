@@ -16,7 +16,7 @@ use crate::latent_files::LatentFiles;
 use crate::output::{self, with_remedy};
 use crate::piped;
 use crate::printable::printable_json;
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::{self, Outcome, Report, lines_to_stdout};
 use crate::shard::Shard;
 use crate::source::{self, Encoded, Encoding};
@@ -82,8 +82,8 @@ impl Encode {
         let own = (0..).zip(&self.panoramas).filter(|(at, _)| self.shard.pick(*at));
         let (places, own): (Vec<usize>, Vec<PathBuf>) = own.map(|(at, path)| (at, path.clone())).unzip();
         let own: Vec<_> = places.into_iter().zip(piped::inputs(&own)?).collect();
-        let bars = Bars::new(report);
-        bars.begin("", "panorama", Some(own.len() as u64));
+        let progress = ProgressBars::new(report);
+        progress.begin("", "panorama", Some(own.len() as u64));
         let mut failed = Vec::new();
         for (at, path) in own.iter().map(|(at, path)| (*at, path.as_path())) {
             let encode = || -> Result<Encoded> {
@@ -102,9 +102,9 @@ impl Encode {
                 }
                 Err(error) => failed.push(error),
             }
-            bars.add(1);
+            progress.add(1);
         }
-        bars.end();
+        progress.end();
         if let Some((sheet, path)) = sheet.zip(self.preview.as_ref())
             && failed.len() < self.panoramas.len()
         {

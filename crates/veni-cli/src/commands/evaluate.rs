@@ -12,9 +12,8 @@ use veni_data::{Dataset, Fold, Part};
 use veni_eval::codec::Codec;
 use veni_eval::lpips::{self, Lpips};
 use veni_eval::protocol::{
-    Evaluation, Published, Report as Findings, Settings, ablations, consistency, dataset_size,
-    equivariance, interpolation, inverse_rendering, light, paper, realism, reconstruction, spheres,
-    uniqueness,
+    Evaluation, Published, Report as Findings, Settings, ablations, consistency, dataset_size, equivariance,
+    interpolation, inverse_rendering, light, paper, realism, reconstruction, spheres, uniqueness,
 };
 use veni_eval::store::Store;
 use veni_eval::table::{Format, Table};
@@ -26,7 +25,7 @@ use crate::args::Layer;
 use crate::output::with_remedy;
 use crate::part::fold;
 use crate::printable::printable_json;
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::{Outcome, Report, lines_to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
@@ -191,14 +190,14 @@ impl Evaluate {
             );
         }
         let published = self.published.as_deref().map(Published::load).transpose()?.unwrap_or_default();
-        let bars = Bars::new(report);
-        let files = inputs::panoramas(&self.data, self.fold, self.images, &bars)?;
+        let progress = ProgressBars::new(report);
+        let files = inputs::panoramas(&self.data, self.fold, self.images, &progress)?;
         inputs::check_folder(&self.out)?;
         let device = DeviceKind::Flex;
         let subjects = inputs::subjects(&self.models, device)?;
         let lpips = if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, device)?) };
-        let data = Dataset::load_observed(&files, grid, &self.layer.options(), &bars);
-        bars.end();
+        let data = Dataset::load_observed(&files, grid, &self.layer.options(), &progress);
+        progress.end();
         let data = data.map_err(with_remedy)?;
         inputs::create_folder(&self.out)?;
         let (store, figures) = (Store::new(&self.out), self.out.join("figures"));
@@ -214,11 +213,11 @@ impl Evaluate {
             settings,
             store: &store,
             figures: &figures,
-            observer: &bars,
+            observer: &progress,
         };
         if self.shard.is_part() {
             let kept = self.protocol.keep(&evaluation, self.shard.part()).map_err(with_remedy);
-            bars.end();
+            progress.end();
             kept?;
             let (out, shard) = (self.out.display(), self.shard);
             let human =
@@ -227,7 +226,7 @@ impl Evaluate {
             return Ok(Outcome::Fine);
         }
         let found = self.protocol.run(&evaluation, &published).map_err(with_remedy);
-        bars.end();
+        progress.end();
         self.show(&found?, report)?;
         Ok(Outcome::Fine)
     }

@@ -5,8 +5,8 @@ mod input;
 mod integrals;
 mod lit;
 mod model;
+mod rendered;
 mod settings;
-mod shaded;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -25,7 +25,7 @@ use crate::latent_files::{LatentFiles, source_of};
 use crate::output::{self, with_remedy};
 use crate::piped;
 use crate::printable::printable_json;
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::{self, Outcome, Report, lines_to_stdout};
 use crate::shard::Shard;
 use crate::size::Size;
@@ -35,8 +35,8 @@ pub(crate) use input::Input;
 use integrals::Integrals;
 use lit::{Lit, LitArgs};
 use model::FitModel;
+use rendered::Rendered;
 use settings::{Settings, Start};
-use shaded::Shaded;
 
 /// Find the latent of a panorama, a part of one, a photograph, the light on a surface, or harmonics of light
 #[derive(Args, Debug)]
@@ -93,7 +93,7 @@ pub(crate) struct Fit {
     settings: Settings,
 
     #[command(flatten)]
-    shaded: Shaded,
+    rendered: Rendered,
 
     #[command(flatten)]
     integrals: Integrals,
@@ -129,7 +129,7 @@ impl Fit {
         let outputs = self.target.of(pictures, overwrite, self.shard)?;
         self.shard.note_idle(pictures.len(), report);
         self.settings.grid(false)?;
-        let config = self.settings.config(self.shaded.normals.is_some())?;
+        let config = self.settings.config(self.rendered.normals.is_some())?;
         let model = FitModel::new(source::model(&self.model)?)?;
         report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
             self.one(&piped::input(path)?, outputs.get(at), &model, &config, report)
@@ -151,7 +151,7 @@ impl Fit {
                 );
             }
         }
-        let is_seen = !self.input.pictures.is_empty() && self.shaded.normals.is_none();
+        let is_seen = !self.input.pictures.is_empty() && self.rendered.normals.is_none();
         if self.completed.is_some() && self.integrals.scales() && is_seen {
             bail!(
                 "--illuminance gives the latent another unit than the picture's: leave --completed out, and bake the latent"
@@ -176,7 +176,7 @@ impl Fit {
         report: Report,
     ) -> Result<()> {
         let picture = self.input.read(path, report)?;
-        let mut fitted = match &self.shaded.normals {
+        let mut fitted = match &self.rendered.normals {
             Some(normals) => self.fit_light(path, normals, &picture, model, config, report)?,
             None => {
                 let grid = self.settings.grid(picture.is_partial())?;
@@ -209,7 +209,7 @@ impl Fit {
             }
         };
         self.integrals.scale(model, &mut fitted.best)?;
-        let seen = Some(&picture).filter(|_| self.shaded.normals.is_none());
+        let seen = Some(&picture).filter(|_| self.rendered.normals.is_none());
         self.keep(&mut fitted.best, path, output, seen, model)?;
         self.print(path, output, &fitted, report)
     }
@@ -274,13 +274,13 @@ impl Fit {
         let vectors = model.latent_vectors();
         let config = self.settings.adapted(*config, partial, vectors);
         let (total, prior) = (config.most_updates(vectors) * starts.len() as u64, model.prior());
-        let bars = Bars::new(report);
-        bars.begin("", "step", Some(total));
+        let progress = ProgressBars::new(report);
+        progress.begin("", "step", Some(total));
         let target = observation.target().with_prior(&prior);
         let best = model.best_of(&target, &starts, &config, &mut |step, loss| {
-            bars.advance(step, &format!("loss {loss:.4}"));
+            progress.advance(step, &format!("loss {loss:.4}"));
         });
-        bars.end();
+        progress.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         let scores = match (partial, observation.clipped().is_some()) {
             (false, false) => Some(model.score(&best.latent, &observation)?),
@@ -306,7 +306,7 @@ impl Fit {
     ) -> Result<Fitted> {
         let started = Instant::now();
         let view = self.input.view();
-        let image = self.shaded.image(normals, self.input.mask(), picture, view)?;
+        let image = self.rendered.image(normals, self.input.mask(), picture, view)?;
         let config = self.settings.for_light(*config);
         let (start, count) = self.settings.start(false, false);
         let n = model.latent_vectors();
@@ -314,7 +314,7 @@ impl Fit {
             Start::Noise => None,
             Start::Zero => Some(Latent::new(vec![[0.0; 3]; n])),
             Start::Encoder => bail!(
-                "{}: the encoder needs a panorama, not a shaded picture: use --start zero or noise",
+                "{}: the encoder needs a panorama, not the rendered image of a surface: use --start zero or noise",
                 path.display()
             ),
         };
@@ -322,16 +322,16 @@ impl Fit {
         let random = random_starts(&model.prior(), 0.0, rest, self.settings.seed());
         let mut starts: Vec<_> = first.into_iter().chain(random).collect();
         self.check_starts(starts.len())?;
-        self.shaded.exposed(&image, picture, model, &mut starts)?;
+        self.rendered.exposed(&image, picture, model, &mut starts)?;
         let prior = model.prior();
-        let bars = Bars::new(report);
-        bars.begin("", "step", Some(config.steps * starts.len() as u64));
-        let mut observer = |step, loss| bars.advance(step, &format!("loss {loss:.4}"));
+        let progress = ProgressBars::new(report);
+        progress.begin("", "step", Some(config.steps * starts.len() as u64));
+        let mut observer = |step, loss| progress.advance(step, &format!("loss {loss:.4}"));
         let best = best_light(model.decoder(), &image, Some(&prior), &starts, &config, &mut observer);
-        bars.end();
+        progress.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         for latent in best.all.iter_mut().chain([&mut best.latent]) {
-            latent.log_exposure = self.shaded.recorded(latent.log_exposure);
+            latent.log_exposure = self.rendered.recorded(latent.log_exposure);
         }
         Ok(Fitted { best, known: None, scores: None, seconds: started.elapsed().as_secs_f64() })
     }
@@ -395,7 +395,7 @@ impl Fit {
         let quality = match (scores, known) {
             (Some(s), _) => format!("LDR PSNR {:.1} dB", s.ldr_psnr),
             (None, Some(known)) => format!("{:.0} % of the sphere known", 100.0 * known),
-            (None, None) => "from a shaded surface".to_owned(),
+            (None, None) => "from a rendered image".to_owned(),
         };
         let starts = match best.all.len() {
             1 => String::new(),

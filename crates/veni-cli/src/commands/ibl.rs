@@ -20,7 +20,7 @@ use veni_light::sphere::Equirect;
 use crate::args::{Decoding, Force, Layer};
 use crate::numbers::{finite, positive};
 use crate::output::with_remedy;
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
 use crate::source::{self, Named};
@@ -192,14 +192,14 @@ impl Ibl {
             exposure,
             sampling: folders.iter().any(|f| f.0 == Engine::Any).then(|| split.sampling()).transpose()?,
         };
-        let bars = Bars::new(report);
+        let progress = ProgressBars::new(report);
         let images: usize = folders.iter().map(|(engine, _)| engine.images(self.size)).sum();
-        Observer::begin(&bars, "image", "", 0, images);
+        Observer::begin(&progress, "image", "", 0, images);
         let outcome = report::each(&folders, |(engine, folder)| {
-            let files = engine::write(*engine, &sky, folder, overwrite, &bars).map_err(with_remedy)?;
+            let files = engine::write(*engine, &sky, folder, overwrite, &progress).map_err(with_remedy)?;
             self.report(*engine, folder, &files, &sky, unit, started, report)
         });
-        bars.end();
+        progress.end();
         outcome
     }
 
@@ -218,19 +218,19 @@ impl Ibl {
         Ok(folders)
     }
 
-    /// Takes the sun out and turns everything.
+    /// Takes the sun out and rotates everything.
     fn split(&self, panorama: Panorama) -> Result<Split> {
         let angle = self.turn.to_radians();
-        let turned = |p: Panorama| if angle == 0.0 { p } else { p.turn(angle) };
+        let rotated = |p: Panorama| if angle == 0.0 { p } else { p.rotated(angle) };
         let light = LightOptions { lights: 1, ..LightOptions::default() }.of(panorama.environment()?)?;
         let up = light.irradiance([0.0, 0.0, 1.0]);
         match light.sun().filter(|_| self.sun == SunMode::Split) {
             Some(sun) => {
                 let rest = Panorama::new(panorama.grid(), light.residual().pixels().to_vec());
-                let sun = Some(sun.turned(angle));
-                Ok(Split { map: turned(rest), whole: Some(turned(panorama)), sun, up })
+                let sun = Some(sun.rotated(angle));
+                Ok(Split { map: rotated(rest), whole: Some(rotated(panorama)), sun, up })
             }
-            None => Ok(Split { map: turned(panorama), whole: None, sun: None, up }),
+            None => Ok(Split { map: rotated(panorama), whole: None, sun: None, up }),
         }
     }
 

@@ -82,7 +82,7 @@ pub(crate) struct Light {
     #[arg(long, value_enum, value_name = "CONVENTION")]
     sh: Option<Convention>,
 
-    /// Also print illuminance in lux, one unit of the file being so many cd/m² [default: 1000 for what 'veni-cli synth' made, 1
+    /// Also print illuminance in lux, one unit of the file being CD cd/m² [default: 1000 for what 'veni-cli synth' made, 1
     /// for other files]
     #[arg(long, value_name = "CD", num_args = 0..=1, value_parser = positive)]
     #[allow(clippy::option_option, reason = "a flag that may have a value")]

@@ -18,7 +18,7 @@ use crate::asked::Asked;
 use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::piped;
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::{Outcome, Report, to_stdout};
 use crate::size::Size;
 use crate::source::{self, Loaded, RandomSkies};
@@ -138,8 +138,8 @@ impl Sample {
         let device = Device::open(self.decoding.device, model, report)?;
         let cell = Equirect::new(width, height);
         let mut sheet = Sheet::new(grid.columns, grid.rows, width, height);
-        let bars = Bars::new(report);
-        bars.begin("", "sky", Some(count as u64));
+        let progress = ProgressBars::new(report);
+        progress.begin("", "sky", Some(count as u64));
         for (at, seed) in (self.seed..=last).enumerate() {
             let latent = skies.sky(seed)?;
             if let Some(file) = files.get(at) {
@@ -152,9 +152,9 @@ impl Sample {
                 at / grid.columns,
                 sky.pixels().iter().map(|p| tonemap.apply_u8(*p)),
             );
-            bars.add(1);
+            progress.add(1);
         }
-        bars.end();
+        progress.end();
         sheet.write(path, overwrite).map_err(with_remedy)?;
         let Grid { columns, rows } = grid;
         let human = format!(

@@ -15,12 +15,12 @@ use veni_image::tonemap::Tonemap;
 use veni_image::{Panorama, Precision};
 use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
-use veni_synth::{Overrides, Place, Scene, SkyKind, generate};
+use veni_synth::{Overrides, Scene, Setting, SkyKind, generate};
 
 use crate::args::Force;
 use crate::features::{LEARN, only};
 use crate::output::{self, with_remedy};
-use crate::progress::{Bars, duration};
+use crate::progress::{ProgressBars, duration};
 use crate::report::{Outcome, Report};
 use crate::shard::Shard;
 use crate::size::Size;
@@ -78,8 +78,8 @@ pub(crate) struct Synth {
     scene: Option<SkyKind>,
 
     /// What stands around the viewer
-    #[arg(long, value_name = "PLACE", value_parser = named(&Place::ALL, Place::name))]
-    place: Option<Place>,
+    #[arg(long, value_name = "PLACE", value_parser = named(&Setting::ALL, Setting::name))]
+    place: Option<Setting>,
 
     /// Height of the sun above the horizon; negative after sunset
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
@@ -156,8 +156,8 @@ impl Synth {
         };
         let cells = if sheet.is_some() { self.count.min(MAX_CELLS) } else { 0 };
         let kept = Mutex::new(0u64);
-        let bars = Bars::new(report);
-        bars.begin("", "sky", Some(count as u64));
+        let progress = ProgressBars::new(report);
+        progress.begin("", "sky", Some(count as u64));
         let shared = Mutex::new(sheet);
         let finished = |index: u64, panorama: Option<&Panorama>| -> Result<()> {
             let mut sheet = shared.lock().map_err(|_| anyhow!("a thread was lost"))?;
@@ -169,7 +169,7 @@ impl Synth {
                 let pixels = panorama.pixels().iter().map(|p| tonemap.apply_u8(*p));
                 sheet.place(at % COLUMNS, at / COLUMNS, pixels);
             }
-            bars.add(1);
+            progress.add(1);
             Ok(())
         };
         // a file that is there already only counts; the sheet needs its picture all the same
@@ -208,7 +208,7 @@ impl Synth {
         }
         let kept = kept.into_inner().map_err(|_| anyhow!("a thread was lost"))?;
         let sheet = shared.into_inner().map_err(|_| anyhow!("a thread was lost"))?;
-        bars.end();
+        progress.end();
         if let (Some(sheet), Some(path)) = (sheet, &self.sheet) {
             sheet.write(path, overwrite).map_err(with_remedy)?;
         }
@@ -219,7 +219,7 @@ impl Synth {
     fn overrides(&self) -> Result<Overrides> {
         let overrides = Overrides {
             sky: self.scene,
-            place: self.place,
+            setting: self.place,
             sun_elevation: self.sun_elevation,
             sun_azimuth: self.sun_azimuth,
             turbidity: self.turbidity,

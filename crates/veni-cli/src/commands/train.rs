@@ -20,7 +20,7 @@ use veni_light::model::ModelKind;
 use crate::commands::inspect::run::{self, Best};
 use crate::interrupt;
 use crate::output::with_remedy;
-use crate::progress::{Bars, duration};
+use crate::progress::{ProgressBars, duration};
 use crate::report::{Outcome, Report};
 use args::TrainDevice;
 use command_line::shell_word;
@@ -51,10 +51,11 @@ impl Train {
                 }
             ));
         }
-        let stop = interrupt::tell("stopping after this step and writing a checkpoint (again: end at once)");
-        let bars = Bars::new(report);
-        let finish = trainer.run(stop, &mut &bars).map_err(with_remedy)?;
-        bars.end();
+        let stop =
+            interrupt::handle("stopping after this step and writing a checkpoint (again: end at once)");
+        let progress = ProgressBars::new(report);
+        let finish = trainer.run(stop, &mut &progress).map_err(with_remedy)?;
+        progress.end();
         let (done, total) = (trainer.steps_done(), trainer.config().steps);
         let best = run::best(&self.out)?;
         self.report(report, finish, [done, total], best.as_ref(), started)?;
@@ -72,9 +73,9 @@ impl Train {
     fn begun(&self, report: Report) -> Result<Trainer> {
         let config = self.settings()?;
         let replaced = self.check_folder()?;
-        let bars = Bars::new(report);
-        let trainer = Trainer::prepare(&self.out, config, &self.command_line(), &bars);
-        bars.end();
+        let progress = ProgressBars::new(report);
+        let trainer = Trainer::prepare(&self.out, config, &self.command_line(), &progress);
+        progress.end();
         let mut trainer = trainer.map_err(|e| self.with_options(e))?;
         if replaced.is_some() {
             // what is there goes only now, when the new data is known to be good
@@ -112,9 +113,9 @@ impl Train {
         }
         self.check_same(&stored)?;
         let storage = self.pixel_storage(&stored)?;
-        let bars = Bars::new(report);
-        let trainer = Trainer::resume_with(&self.out, &self.command_line(), &storage, &bars);
-        bars.end();
+        let progress = ProgressBars::new(report);
+        let trainer = Trainer::resume_with(&self.out, &self.command_line(), &storage, &progress);
+        progress.end();
         trainer.map_err(with_remedy)
     }
 
@@ -179,7 +180,7 @@ fn note_device(config: &TrainConfig, report: Report) -> Result<()> {
         }
     }
     if config.decoder_backend.is_kernels() {
-        report.note("decoder_by = kernels: the decoder is computed by the processor, not on the device");
+        report.note("decoder_backend = kernels: the decoder is computed by the processor, not on the device");
     }
     Ok(())
 }

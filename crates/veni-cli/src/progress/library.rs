@@ -6,9 +6,9 @@ use veni_core::train::progress::{Progress, StepReport, ValidationReport};
 use veni_image::metrics::Scores;
 use veni_light::progress::Observer;
 
-use super::Bars;
+use super::ProgressBars;
 
-impl Observer for Bars {
+impl Observer for ProgressBars {
     fn begin(&self, unit: &'static str, task: &str, done: usize, total: usize) {
         self.end();
         if done > 0 {
@@ -29,7 +29,7 @@ impl Observer for Bars {
 }
 
 #[cfg(feature = "learn")]
-impl Progress for &Bars {
+impl Progress for &ProgressBars {
     fn start(&mut self, done: u64, total: u64) {
         self.begin_after(done, "", "step", Some(total));
     }
@@ -37,7 +37,11 @@ impl Progress for &Bars {
     fn step(&mut self, step: &StepReport, _remaining: f64) {
         let parts: Vec<_> = step.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
         let stage = step.stage.as_ref().map(|stage| format!("{stage}, ")).unwrap_or_default();
-        Bars::advance(self, step.step, &format!("{stage}loss {:.4} ({})", step.loss, parts.join(", ")));
+        ProgressBars::advance(
+            self,
+            step.step,
+            &format!("{stage}loss {:.4} ({})", step.loss, parts.join(", ")),
+        );
     }
 
     fn validation(&mut self, report: &ValidationReport) {

@@ -32,7 +32,7 @@ pub(crate) struct Encoded {
 pub(crate) struct Encoding<'a> {
     loaded: &'a Loaded,
     encoder: Encoder,
-    /// So many lights are taken out of a panorama, and put into its latent.
+    /// The number of lights that are taken out of a panorama and put into its latent.
     lights: usize,
 }
 

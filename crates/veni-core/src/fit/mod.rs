@@ -8,7 +8,7 @@ mod whole_loss;
 
 pub use veni_fit::{
     Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient, Method, Objective,
-    Observation, PanoramaLoss, Plateau, fit_shaded, from_each, loss, matching_exposure, random_starts,
+    Observation, PanoramaLoss, Plateau, fit_rendered, from_each, loss, matching_exposure, random_starts,
     schedule, shade,
 };
 

@@ -6,8 +6,8 @@ use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
 use super::shade::{
-    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedImage, ShadedLoss, ShadingForm, Surface,
-    Transfer,
+    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm,
+    Surface, Transfer,
 };
 use super::*;
 use crate::train::loss::LossConfig;
@@ -39,7 +39,7 @@ fn objectives() -> [Objective; 7] {
         Objective::LogError,
         Objective::LogAbsolute,
         Objective::Display { log: 0.01 },
-        Objective::Energy { share: 0.4 },
+        Objective::Energy { weight: 0.4 },
         Objective::ReferenceLogError,
         Objective::CosineScaleInvariant,
         Objective::Terms(LossConfig { mage_scales: 1, ..LossConfig::default() }),
@@ -110,7 +110,7 @@ fn where_it_does_not_apply_it_is_refused_and_auto_takes_adam() {
 }
 
 /// A glossy ball under the light of a latent.
-fn ball(seed: u64, exposure: f32) -> ShadedImage {
+fn ball(seed: u64, exposure: f32) -> RenderedImage {
     let place = ([0.0; 3], 1.0);
     let camera = Camera::framing(place, [0.0; 2], REFERENCE_FIELD_OF_VIEW, [20, 20], 0.05).unwrap();
     let surface = Surface::sphere(&camera, place, 20, 20).unwrap();
@@ -120,7 +120,7 @@ fn ball(seed: u64, exposure: f32) -> ShadedImage {
     let light = Latent { log_exposure: exposure, ..latent(seed) };
     let field = model(&decoder()).decoder().unwrap().condition(&light).unwrap();
     let photograph = transfer.render(&field.bake(Equirect::new(16, 8)));
-    ShadedImage::new(transfer, &photograph, ShadedLoss::default()).unwrap()
+    RenderedImage::new(transfer, &photograph, RenderingLoss::default()).unwrap()
 }
 
 #[test]
@@ -130,8 +130,8 @@ fn the_light_on_a_surface_is_the_same_both_ways() {
     let images = [ball(1, 0.0), ball(2, 0.3)];
     let start = [3, 4].map(latent);
     let config = FitConfig { free_exposure: true, steps: 4, ..FitConfig::light() };
-    let a = fit_shaded(&fast, &images, None, &start, &config, &mut |_, _| {}).unwrap();
-    let b = fit_shaded(&graph, &images, None, &start, &config, &mut |_, _| {}).unwrap();
+    let a = fit_rendered(&fast, &images, None, &start, &config, &mut |_, _| {}).unwrap();
+    let b = fit_rendered(&graph, &images, None, &start, &config, &mut |_, _| {}).unwrap();
     for (a, b) in a.losses.iter().chain(&a.last).zip(b.losses.iter().chain(&b.last)) {
         assert!((a - b).abs() < 1e-4 * (1e-3 + b), "{a} {b}");
     }

@@ -15,7 +15,7 @@ pub(super) struct WholeLoss {
 
 #[derive(Debug)]
 enum Kind {
-    Rays { level: bool },
+    Rays { exposure: bool },
     Terms(Box<Loss>),
 }
 
@@ -25,7 +25,7 @@ impl WholeLoss {
         let (width, height) = (target.grid().width, target.grid().height);
         let (name, kind) = match config.objective {
             Objective::CosineScaleInvariant => {
-                ("cosine-scale-invariant", Kind::Rays { level: config.free_exposure })
+                ("cosine-scale-invariant", Kind::Rays { exposure: config.free_exposure })
             }
             Objective::Terms(losses) => {
                 if !target.is_panoramic() {
@@ -43,7 +43,7 @@ impl WholeLoss {
                 let LossConfig {
                     mage,
                     scale_invariant,
-                    level,
+                    exposure,
                     cosine,
                     log_mse,
                     hdr_mse,
@@ -51,7 +51,8 @@ impl WholeLoss {
                     irradiance,
                     ..
                 } = losses;
-                let weights = [mage, scale_invariant, level, cosine, log_mse, hdr_mse, ldr_mse, irradiance];
+                let weights =
+                    [mage, scale_invariant, exposure, cosine, log_mse, hdr_mse, ldr_mse, irradiance];
                 if weights.iter().all(|w| w.at(0) == 0.0) {
                     return Err(Error::invalid("the objective terms has no weight above 0 to begin with"));
                 }
@@ -78,9 +79,9 @@ impl WholeLoss {
 
     fn between(&self, p: Tensor<4>, i: Tensor<4>) -> Tensor<1> {
         match &self.kind {
-            Kind::Rays { level } => {
+            Kind::Rays { exposure } => {
                 let shape = cosine::rays(p.clone(), i.clone()) + scale_invariant::rays(p.clone(), i.clone());
-                if !level {
+                if !exposure {
                     return shape;
                 }
                 let rows = Tensor::ones([1, p.dims()[1], 1, 1], &p.device());

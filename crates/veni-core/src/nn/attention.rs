@@ -26,7 +26,7 @@ pub struct VectorAttentionConfig {
 /// softmax(⟨q_t, k_s⟩ / √(head channels · coordinates)) over tokens s, applied to v_s, per head.
 ///
 /// q, k, v are vector features; the product runs over all channels and coordinates of a head, so the weights
-/// are invariant and the output turns with the input. With [`VectorLayer::Vn`] this is Vector-Neuron attention
+/// are invariant and the output rotates with the input. With [`VectorLayer::Vn`] this is Vector-Neuron attention
 /// (equivariant under every orthogonal map of the coordinates), with [`VectorLayer::So2`] SO(2) attention.
 #[derive(Module, Debug)]
 pub struct VectorAttention {
@@ -128,14 +128,14 @@ mod tests {
     }
 
     #[test]
-    fn turns_with_its_input_and_forgets_the_order_of_tokens() {
+    fn rotates_with_its_input_and_forgets_the_order_of_tokens() {
         let device = Device::flex();
         let x = features([2, 3, 6, 4], 1, &device);
         for layer in [VectorLayer::Vn, VectorLayer::So2] {
             let attention = config(layer).init(&mut rng(2), &device);
             let y = attention.forward(x.clone(), None);
-            let turned = attention.forward(rotate_xy(x.clone(), 1.1), None);
-            assert!(max_difference(turned, rotate_xy(y.clone(), 1.1)) < 1e-5);
+            let rotated = attention.forward(rotate_xy(x.clone(), 1.1), None);
+            assert!(max_difference(rotated, rotate_xy(y.clone(), 1.1)) < 1e-5);
             let flipped = attention.forward(x.clone().flip([1]), None);
             assert!(max_difference(flipped, y.flip([1])) < 1e-5);
         }

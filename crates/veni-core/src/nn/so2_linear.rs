@@ -170,8 +170,8 @@ mod tests {
         let layer = config().init(&mut rng(2), &device);
         let y = layer.forward(x.clone());
         assert_eq!(y.dims(), [2, 3, 3, 4]);
-        let turned = layer.forward(rotate_xy(x.clone(), 2.1));
-        assert!(max_difference(turned, rotate_xy(y.clone(), 2.1)) < 1e-5);
+        let rotated = layer.forward(rotate_xy(x.clone(), 2.1));
+        assert!(max_difference(rotated, rotate_xy(y.clone(), 2.1)) < 1e-5);
         assert!(max_difference(layer.forward(reflect_y(x)), reflect_y(y)) < 1e-5);
     }
 

@@ -43,8 +43,8 @@ mod tests {
         let config = VnReluConfig { channels: 5, form: VnReluForm::Projection };
         let layer = So2Relu::init(config, &mut rng(1), &device);
         let x = features([2, 3, 6, 5], 2, &device);
-        let turned = layer.forward(rotate_xy(x.clone(), 2.1));
-        assert!(max_difference(turned, rotate_xy(layer.forward(x.clone()), 2.1)) < 1e-5);
+        let rotated = layer.forward(rotate_xy(x.clone(), 2.1));
+        assert!(max_difference(rotated, rotate_xy(layer.forward(x.clone()), 2.1)) < 1e-5);
         assert_gradients(layer, x, So2Relu::forward);
     }
 }

@@ -17,7 +17,7 @@ pub(crate) fn features(shape: [usize; 4], seed: u64, device: &Device) -> Tensor<
     Tensor::from_data(TensorData::new(values, shape), device)
 }
 
-/// Turns x and y of a feature by `angle`.
+/// Rotates x and y of a feature by `angle`.
 pub(crate) fn rotate_xy(x: Tensor<4>, angle: f64) -> Tensor<4> {
     let (sin, cos) = angle.sin_cos();
     let (a, b) = (x.clone().narrow(2, 0, 1), x.clone().narrow(2, 1, 1));

@@ -18,7 +18,7 @@ pub struct VnInvariantConfig {
     pub form: VnReluForm,
 }
 
-/// a = VnReLU(X W) holds c vectors that turn with X; out_o = Σ_channel ⟨X_channel, a_o⟩.
+/// a = VnReLU(X W) holds c vectors that rotate with X; out_o = Σ_channel ⟨X_channel, a_o⟩.
 #[derive(Module, Debug)]
 pub struct VnInvariant {
     /// W, channels to c.

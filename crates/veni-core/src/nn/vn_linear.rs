@@ -98,8 +98,8 @@ mod tests {
         let device = Device::flex();
         let x = features([2, 3, 6, 5], 1, &device);
         let layer = VnLinearConfig::new(5, 4).init(&mut rng(2), &device);
-        let turned = layer.forward(rotate_xy(x.clone(), 0.7));
-        assert!(max_difference(turned, rotate_xy(layer.forward(x.clone()), 0.7)) < 1e-5);
+        let rotated = layer.forward(rotate_xy(x.clone(), 0.7));
+        assert!(max_difference(rotated, rotate_xy(layer.forward(x.clone()), 0.7)) < 1e-5);
 
         let biased =
             VnLinearConfig { bias_length: 0.1, ..VnLinearConfig::new(5, 4) }.init(&mut rng(2), &device);

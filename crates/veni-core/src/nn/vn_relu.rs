@@ -100,8 +100,8 @@ mod tests {
         let x = features([2, 3, 6, 5], 1, &device);
         for form in FORMS {
             let layer = layer(form, &device);
-            let turned = layer.forward(rotate_xy(x.clone(), 2.1));
-            assert!(max_difference(turned, rotate_xy(layer.forward(x.clone()), 2.1)) < 1e-5);
+            let rotated = layer.forward(rotate_xy(x.clone(), 2.1));
+            assert!(max_difference(rotated, rotate_xy(layer.forward(x.clone()), 2.1)) < 1e-5);
         }
     }
 

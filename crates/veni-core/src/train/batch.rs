@@ -104,15 +104,15 @@ impl<'a> Batches<'a> {
             let image = self.augmented(self.draws.choice(step, slot), step, slot as u64);
             let yaw =
                 std::f64::consts::TAU * stream(self.seed, Purpose::Sampling, step, 1 + slot as u64).uniform();
-            // the grid is turned, not the image: samples and directions lie at −yaw, in the image's own frame
-            let samples = self.stripes.gather_turned(grid, yaw).sample(image.as_chunks().0);
+            // the grid is rotated, not the image: samples and directions lie at −yaw, in the image's own frame
+            let samples = self.stripes.gather_rotated(grid, yaw).sample(image.as_chunks().0);
             batch.stripe_samples.extend(samples.into_flattened());
             let (sin, cos) = yaw.sin_cos();
-            let turned = |[x, y, z]: &[f32; 3]| {
+            let rotated = |[x, y, z]: &[f32; 3]| {
                 let (x, y) = (f64::from(*x), f64::from(*y));
                 [(cos * x + sin * y) as f32, (cos * y - sin * x) as f32, *z]
             };
-            batch.stripe_directions.extend(self.directions.iter().flat_map(turned));
+            batch.stripe_directions.extend(self.directions.iter().flat_map(rotated));
             loss.extend_target(&image, &mut batch.target);
             let mut noise = stream(self.seed, Purpose::Noise, step, slot as u64);
             batch.noise.extend((0..3 * self.latent_vectors).map(|_| noise.normal() as f32));

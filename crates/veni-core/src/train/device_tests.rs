@@ -220,7 +220,7 @@ fn bfloat16_computes_nearly_the_same_step() {
     let by = DecoderBackend::KernelsBfloat16;
     if let Err(error) = by.check() {
         say(&format!("bfloat16 skipped: {error}"));
-        assert!(error.to_string().contains("take decoder_by = kernels"), "{error}");
+        assert!(error.to_string().contains("take decoder_backend = kernels"), "{error}");
         return;
     }
     for config in [Preset::Tiny.config(3), Preset::Tiny.auto_decoder(3)] {

@@ -1,5 +1,6 @@
 //! Training: what defines a run ([`config`], [`presets`], [`init`]), what one update does ([`batch`], [`step`], [`loss`],
-//! [`replicas`], [`schedule`], [`optimiser`]; of an auto-decoder [`rays`] and [`latents`]), and the loop with its folder ([`run`], [`checkpoint`], [`progress`]).
+//! [`replicas`], [`schedule`], [`optimiser`]; of an auto-decoder [`rays`] and [`latents`]), and the loop with its folder
+//! ([`run`], [`checkpoint`], [`progress`]).
 
 pub mod batch;
 pub mod checkpoint;

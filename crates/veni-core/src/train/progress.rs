@@ -1,4 +1,4 @@
-//! What a run tells whoever started it. The library prints nothing.
+//! What a training run reports to its observer. The library prints nothing.
 
 use std::collections::BTreeMap;
 

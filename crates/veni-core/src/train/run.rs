@@ -278,7 +278,7 @@ impl Trainer {
     }
 }
 
-/// Whether something is done every so many updates is done after this one; never if `every` is 0.
+/// Whether something is done every `every` updates is due after this one; never if `every` is 0.
 fn due(step: u64, every: u64) -> bool {
     every > 0 && step.is_multiple_of(every)
 }

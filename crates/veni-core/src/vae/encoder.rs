@@ -24,8 +24,8 @@ const LATENT_COORDINATES: usize = 3;
 /// 4. The transformer; then the class token (or the mean over tokens) is read:
 /// 5. `project_out` gives μ; `project_log_variance` gives vectors w with ln σ² = |w_xy| + w_z.
 ///
-/// Turning all directions about z turns the latent by the same angle; the order of stripes does not matter.
-/// Hence a panorama rolled by whole stripes, sampled on the same grid, gives the turned latent exactly.
+/// Rotating all directions about z rotates the latent by the same angle; the order of stripes does not matter.
+/// Hence a panorama rolled by whole stripes, sampled on the same grid, gives the rotated latent exactly.
 #[derive(Module, Debug)]
 pub struct Encoder {
     /// Samples to channels.

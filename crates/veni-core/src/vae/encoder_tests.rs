@@ -67,12 +67,12 @@ fn encoder(config: &EncoderConfig, device: &Device) -> Encoder {
     encoder
 }
 
-/// Turns vectors `[.., N, 3]` about z by `angle`.
-fn turn<const D: usize>(x: Tensor<D>, angle: f64) -> Tensor<D> {
+/// Rotates vectors `[.., N, 3]` about z by `angle`.
+fn rotate<const D: usize>(x: Tensor<D>, angle: f64) -> Tensor<D> {
     let (sin, cos) = (angle.sin() as f32, angle.cos() as f32);
-    let turn = Tensor::<2>::from_floats([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]], &x.device());
+    let matrix = Tensor::<2>::from_floats([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]], &x.device());
     let shape = x.shape();
-    x.reshape([-1, 3]).matmul(turn).reshape(shape)
+    x.reshape([-1, 3]).matmul(matrix).reshape(shape)
 }
 
 /// max |a − b| / max |b|.
@@ -82,17 +82,17 @@ fn relative(a: &Tensor<3>, b: &Tensor<3>) -> f32 {
 }
 
 #[test]
-fn turned_directions_turn_the_latent() {
+fn rotated_directions_rotate_the_latent() {
     let device = Device::flex();
     let radiance = features([2, STRIPES, SAMPLES, 3], 2, &device);
     for (name, config) in variants() {
         let encoder = encoder(&config, &device);
         let straight = encoder.forward(grid(&device), radiance.clone());
-        let turned = encoder.forward(turn(grid(&device), 0.9), radiance.clone());
-        let error = relative(&turned.mean, &turn(straight.mean.clone(), 0.9));
+        let rotated = encoder.forward(rotate(grid(&device), 0.9), radiance.clone());
+        let error = relative(&rotated.mean, &rotate(straight.mean.clone(), 0.9));
         assert!(error < 1e-5, "{name}: {error}");
-        assert!(relative(&turned.mean, &straight.mean) > 1e-3, "{name}: nothing turned");
-        if let (Some(a), Some(b)) = (&turned.log_variance, &straight.log_variance) {
+        assert!(relative(&rotated.mean, &straight.mean) > 1e-3, "{name}: nothing rotated");
+        if let (Some(a), Some(b)) = (&rotated.log_variance, &straight.log_variance) {
             assert!(relative(a, b) < 1e-5, "{name}: the variance is not invariant");
         }
         assert_eq!(straight.log_variance.is_some(), config.variational);
@@ -100,7 +100,7 @@ fn turned_directions_turn_the_latent() {
 }
 
 #[test]
-fn rolling_by_whole_stripes_turns_the_latent() {
+fn rolling_by_whole_stripes_rotates_the_latent() {
     let device = Device::flex();
     let radiance = features([2, STRIPES, SAMPLES, 3], 2, &device);
     for (name, config) in variants() {
@@ -109,7 +109,7 @@ fn rolling_by_whole_stripes_turns_the_latent() {
         for roll in [1, 3] {
             let rolled = encoder.forward(grid(&device), radiance.clone().roll_dim(roll as i64, 1));
             let angle = std::f64::consts::TAU * roll as f64 / STRIPES as f64;
-            let error = relative(&rolled.mean, &turn(straight.mean.clone(), angle));
+            let error = relative(&rolled.mean, &rotate(straight.mean.clone(), angle));
             assert!(error < 1e-5, "{name}, {roll} stripes: {error}");
         }
     }

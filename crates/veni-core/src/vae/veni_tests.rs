@@ -1,5 +1,5 @@
-//! The whole model is equivariant: a panorama turned by whole stripes gives the turned latent, and that the
-//! turned picture. On a real panorama, with the shipped sizes of sampling and random weights.
+//! The whole model is equivariant: a panorama rotated by whole stripes gives the rotated latent, and that the
+//! rotated picture. On a real panorama, with the shipped sizes of sampling and random weights.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -8,7 +8,7 @@ use veni_light::random::Stream;
 use burn::tensor::Device;
 
 use super::Veni;
-use veni_data::augment::{mirror, turn_columns};
+use veni_data::augment::{mirror, rotate_columns};
 use veni_data::{Dataset, panorama_files};
 use veni_light::latent::Latent;
 use veni_light::model::{DecoderConfig, EncoderConfig, ModelConfig};
@@ -83,18 +83,18 @@ fn largest(a: &[Vec<f32>], b: &[Vec<f32>]) -> f32 {
 }
 
 #[test]
-fn whole_stripes_turn_latent_and_picture() {
+fn whole_stripes_rotate_latent_and_picture() {
     let setup = Setup::new();
     let latents = setup.encode(|_| ());
     let decoded = setup.decode(&latents);
     let stripe = setup.grid.width / STRIPES;
     for columns in [stripe, 5 * stripe, setup.grid.width / 2] {
-        let turned = setup.encode(|image| turn_columns(setup.grid, image, columns));
-        let error = relative(&turned, latents.iter().map(|z| z.turned(setup.angle(columns))));
+        let rotated = setup.encode(|image| rotate_columns(setup.grid, image, columns));
+        let error = relative(&rotated, latents.iter().map(|z| z.rotated(setup.angle(columns))));
         assert!(error <= 1e-5, "latent, {columns} columns: {error}");
         let mut expected = decoded.clone();
-        expected.iter_mut().for_each(|image| turn_columns(setup.grid, image, columns));
-        let error = largest(&setup.decode(&turned), &expected);
+        expected.iter_mut().for_each(|image| rotate_columns(setup.grid, image, columns));
+        let error = largest(&setup.decode(&rotated), &expected);
         assert!(error <= 1e-4, "log radiance, {columns} columns: {error}");
     }
 }
@@ -105,15 +105,15 @@ fn parts_of_stripes_and_mirrors_are_approximate() {
     let setup = Setup::new();
     let latents = setup.encode(|_| ());
     let half = setup.grid.width / STRIPES / 2;
-    let turned = setup.encode(|image| turn_columns(setup.grid, image, half));
-    let error = relative(&turned, latents.iter().map(|z| z.turned(setup.angle(half))));
+    let rotated = setup.encode(|image| rotate_columns(setup.grid, image, half));
+    let error = relative(&rotated, latents.iter().map(|z| z.rotated(setup.angle(half))));
     assert!((1e-4..0.5).contains(&error), "half a stripe: {error}");
     let mirrored = setup.encode(|image| mirror(setup.grid, image));
     let error = relative(&mirrored, latents.iter().map(Latent::mirrored));
     assert!((1e-4..0.5).contains(&error), "mirror: {error}");
-    // the wrong sense of turning is not a small error
+    // the wrong sense of rotation is not a small error
     let stripe = setup.grid.width / STRIPES;
-    let turned = setup.encode(|image| turn_columns(setup.grid, image, stripe));
-    let error = relative(&turned, latents.iter().map(|z| z.turned(-setup.angle(stripe))));
-    assert!(error > 1e-2, "turned the wrong way: {error}");
+    let rotated = setup.encode(|image| rotate_columns(setup.grid, image, stripe));
+    let error = relative(&rotated, latents.iter().map(|z| z.rotated(-setup.angle(stripe))));
+    assert!(error > 1e-2, "rotated the wrong way: {error}");
 }

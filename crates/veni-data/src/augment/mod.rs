@@ -5,8 +5,8 @@
 //! augmented batch is a pure function of (seed, step, slot). An operation whose strength is 0 is skipped, and
 //! with everything off the image comes back bit for bit.
 //!
-//! Turning: encoder and decoder commute with turns about z, so turning a single panorama teaches nothing but
-//! what the encoder's sampling grid hides inside one stripe; that is covered by the sampling yaw. Turns matter
+//! Rotation: encoder and decoder commute with rotations about z, so rotating a single panorama teaches nothing but
+//! what the encoder's sampling grid hides inside one stripe; that is covered by the sampling yaw. Rotations matter
 //! where two panoramas meet (mixing, recombination, joining), and there whole columns are enough and lose nothing.
 
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ mod combine;
 mod warp;
 
 pub use combine::{join, mix, recombine};
-pub use warp::{azimuth_warp, mirror, polar_warp, turn_columns};
+pub use warp::{azimuth_warp, mirror, polar_warp, rotate_columns};
 
 use veni_image::exposure::centre_exposure;
 use veni_light::sphere::Equirect;
@@ -25,7 +25,7 @@ use veni_light::sphere::Equirect;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AugmentConfig {
-    /// Probability of turning the image by a random number of columns.
+    /// Probability of rotating the image by a random number of columns.
     pub turn: f64,
     /// Probability of a mirror image (left and right exchanged).
     pub mirror: f64,
@@ -88,7 +88,7 @@ impl AugmentConfig {
 
     /// Augments `image` (log radiance at exposure 0, length 3·W·H). `other` fetches a second panorama of the
     /// same size, drawn with the given stream, when mixing, recombining or joining needs one. The result is brought
-    /// back to exposure 0 before the exposure jitter, whenever anything but a turn or mirror touched it.
+    /// back to exposure 0 before the exposure jitter, whenever anything but a rotation or mirror touched it.
     pub fn apply<'a>(
         &self,
         grid: Equirect,
@@ -144,7 +144,7 @@ impl AugmentConfig {
         out
     }
 
-    /// `image`, mirrored and turned as configured; a second panorama is always turned, or the two would keep
+    /// `image`, mirrored and rotated as configured; a second panorama is always rotated, or the two would keep
     /// the bearing in which they happened to be stored.
     fn oriented(&self, grid: Equirect, image: &[f32], rng: &mut Stream, always: bool) -> Vec<f32> {
         let mut out = image.to_vec();
@@ -152,7 +152,7 @@ impl AugmentConfig {
             mirror(grid, &mut out);
         }
         if always || happens(rng, self.turn) {
-            turn_columns(grid, &mut out, rng.below(grid.width));
+            rotate_columns(grid, &mut out, rng.below(grid.width));
         }
         out
     }

@@ -13,8 +13,8 @@ pub fn mirror(grid: Equirect, image: &mut [f32]) {
     }
 }
 
-/// Shifts the image `columns` to the right, wrapping: a turn by −2π·columns/W about z.
-pub fn turn_columns(grid: Equirect, image: &mut [f32], columns: usize) {
+/// Shifts the image `columns` to the right, wrapping: a rotation by −2π·columns/W about z.
+pub fn rotate_columns(grid: Equirect, image: &mut [f32], columns: usize) {
     for row in image.chunks_exact_mut(3 * grid.width) {
         row.rotate_right(3 * (columns % grid.width));
     }
@@ -70,16 +70,16 @@ mod tests {
     use crate::augment::tests::{GRID, image};
 
     #[test]
-    fn mirror_and_turns_permute_columns() {
+    fn mirror_and_rotations_permute_columns() {
         let a = image(3);
         let mut b = a.clone();
         mirror(GRID, &mut b);
         assert_eq!(b[0..3], a[3 * 15..3 * 16]);
         mirror(GRID, &mut b);
         assert_eq!(a, b);
-        turn_columns(GRID, &mut b, 5);
+        rotate_columns(GRID, &mut b, 5);
         assert_eq!(b[15..18], a[0..3]);
-        turn_columns(GRID, &mut b, 11);
+        rotate_columns(GRID, &mut b, 11);
         assert_eq!(a, b);
     }
 

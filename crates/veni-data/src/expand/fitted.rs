@@ -2,7 +2,7 @@
 //!
 //! They were made by
 //! ```text
-//! cargo run --release -p veni-core --no-default-features --example expansion -- fit DIR
+//! cargo run --release -p veni-research --example expansion -- fit DIR
 //! ```
 
 use super::FEATURES;

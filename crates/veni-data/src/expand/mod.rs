@@ -14,8 +14,8 @@
 //!    a second linear function of the same features, and what the map leaves of it becomes a disc of the sun's size.
 //!
 //! The linear functions are fitted to HDR panoramas that were clipped at several exposures ([`Parameters`],
-//! `examples/expansion`); docs/RESULTS.md says how far the results are from the truth. Whoever has a network for it uses
-//! that instead: [`network`].
+//! the example `expansion` of veni-research); docs/results/expansion.md says how far the results are from the truth.
+//! Whoever has a network for it uses that instead: [`network`].
 
 mod analysis;
 mod channels;

@@ -85,19 +85,19 @@ fn the_sun_comes_back_where_it_was() {
 }
 
 #[test]
-fn a_turned_panorama_expands_to_the_turned_expansion() {
+fn a_rotated_panorama_expands_to_the_rotated_expansion() {
     let ldr = record(&sunny(unit([0.5, -0.3, 0.6])));
     let columns = 300;
     let mut values = ldr.values().to_vec();
     values.chunks_exact_mut(GRID.width).for_each(|row| row.rotate_left(columns));
-    let turned = LdrPanorama::new(GRID, values).expand(&ExpandOptions::default()).panorama;
+    let rotated = LdrPanorama::new(GRID, values).expand(&ExpandOptions::default()).panorama;
     let mut expected = ldr.expand(&ExpandOptions::default()).panorama;
     expected.pixels_mut().chunks_exact_mut(GRID.width).for_each(|row| row.rotate_left(columns));
     // the disc's few sample points may fall into a neighbouring pixel by rounding
     let off =
-        turned.pixels().iter().zip(expected.pixels()).filter(|(a, b)| (a[1] - b[1]).abs() > 1e-3 * b[1]);
+        rotated.pixels().iter().zip(expected.pixels()).filter(|(a, b)| (a[1] - b[1]).abs() > 1e-3 * b[1]);
     assert!(off.count() <= 4);
-    assert!((energy(&turned) / energy(&expected) - 1.0).abs() < 1e-4);
+    assert!((energy(&rotated) / energy(&expected) - 1.0).abs() < 1e-4);
 }
 
 #[test]

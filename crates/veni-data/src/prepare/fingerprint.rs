@@ -1,9 +1,9 @@
-//! What a panorama looks like, whichever way it is turned: for finding near-duplicates.
+//! What a panorama looks like, whichever way it is rotated: for finding near-duplicates.
 //!
 //! The luminance of a small image, in logarithms, cut at its 5 % and 90 % quantiles (so that a clipped copy agrees with
 //! the original) and of mean 0 (so that exposure does not count), is kept as the Fourier coefficients of its rows over
-//! azimuth. A turn by α multiplies coefficient m by e^{imα}, the mirror image conjugates it: two fingerprints give the
-//! correlation of two panoramas for all turns, and the product of magnitudes bounds all of them from above.
+//! azimuth. A rotation by α multiplies coefficient m by e^{imα}, the mirror image conjugates it: two fingerprints give the
+//! correlation of two panoramas for all rotations, and the product of magnitudes bounds all of them from above.
 
 use std::f64::consts::PI;
 
@@ -17,8 +17,8 @@ use veni_light::sphere::Equirect;
 const GRID: Equirect = Equirect { width: 256, height: 12 };
 /// Orders over azimuth, besides the mean of a row.
 const ORDERS: usize = 12;
-/// Turns that are tried.
-const TURNS: usize = 192;
+/// Rotations that are tried.
+const ROTATIONS: usize = 192;
 /// Steps of the stored coefficients, of which the squares sum to 1.
 const UNIT: f32 = 16384.0;
 /// Below this part of the variation lying along azimuth, a panorama looks the same from all sides.
@@ -29,7 +29,7 @@ const UNIFORM: f32 = 0.02;
 #[serde(transparent)]
 pub struct Fingerprint(Vec<i16>);
 
-/// How alike two panoramas are, turned and mirrored to fit best.
+/// How alike two panoramas are, rotated and mirrored to fit best.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Likeness {
     /// Correlation of log luminance over the sphere, −1 to 1.
@@ -37,9 +37,9 @@ pub struct Likeness {
     /// Correlation of what varies along azimuth alone: two clear days share their gradient from top to bottom, but
     /// not this.
     pub around: f32,
-    /// The turn about the up axis, counter-clockwise from above, that takes the first to the second (or to the mirror
+    /// The rotation about the up axis, counter-clockwise from above, that takes the first to the second (or to the mirror
     /// image of the second), radians in [−π, π).
-    pub turn: f32,
+    pub rotation: f32,
     /// Whether it is the mirror image.
     pub mirrored: bool,
 }
@@ -134,7 +134,7 @@ impl Unpacked {
         (likeness.around >= Likeness::AROUND && likeness.whole >= Likeness::WHOLE).then_some(likeness)
     }
 
-    /// What [`Likeness::around`] cannot exceed, whatever the turn.
+    /// What [`Likeness::around`] cannot exceed, whatever the rotation.
     pub(super) fn bound(&self, other: &Self) -> f32 {
         let product: f32 = self.magnitudes.iter().zip(&other.magnitudes).map(|(a, b)| a * b).sum();
         product / (self.around * other.around).sqrt().max(f32::MIN_POSITIVE)
@@ -149,26 +149,30 @@ impl Unpacked {
         let mut best = (f32::NEG_INFINITY, 0.0, false);
         for mirrored in [false, true] {
             let cross = self.cross(other, mirrored);
-            for k in 0..TURNS {
-                let turn = std::f32::consts::TAU * k as f32 / TURNS as f32;
+            for k in 0..ROTATIONS {
+                let rotation = std::f32::consts::TAU * k as f32 / ROTATIONS as f32;
                 let correlation = (cross.iter().enumerate())
                     .map(|(m, [re, im])| {
-                        let (sin, cos) = ((m + 1) as f32 * turn).sin_cos();
+                        let (sin, cos) = ((m + 1) as f32 * rotation).sin_cos();
                         re * cos - im * sin
                     })
                     .sum();
                 if correlation > best.0 {
-                    best = (correlation, turn, mirrored);
+                    best = (correlation, rotation, mirrored);
                 }
             }
         }
-        let (around, turn, mirrored) = best;
+        let (around, rotation, mirrored) = best;
         let ratio = |value: f32, a: f32, b: f32| if a * b > 0.0 { value / (a * b).sqrt() } else { 0.0 };
         Likeness {
             whole: ratio(zonal + around, self.whole, other.whole),
             around: ratio(around, self.around, other.around),
             // columns run against the azimuth
-            turn: if turn <= std::f32::consts::PI { -turn } else { std::f32::consts::TAU - turn },
+            rotation: if rotation <= std::f32::consts::PI {
+                -rotation
+            } else {
+                std::f32::consts::TAU - rotation
+            },
             mirrored,
         }
     }
@@ -201,11 +205,11 @@ mod tests {
         values.chunks(2 * ORDERS + 1).map(|row| row.iter().map(|v| f64::from(*v)).collect()).collect()
     }
 
-    /// Three bright sides are waves of order 3 and its multiples alone, and a turn is a phase.
+    /// Three bright sides are waves of order 3 and its multiples alone, and a rotation is a phase.
     #[test]
-    fn a_wave_is_seen_at_its_order_and_turns_by_its_phase() {
-        let wave = |turn: f32| {
-            let log = |[x, y, _]: [f32; 3]| 0.8 * (3.0 * (y.atan2(x) - turn)).cos();
+    fn a_wave_is_seen_at_its_order_and_rotates_by_its_phase() {
+        let wave = |rotation: f32| {
+            let log = |[x, y, _]: [f32; 3]| 0.8 * (3.0 * (y.atan2(x) - rotation)).cos();
             Panorama::from_fn(Equirect::new(256, 128), |d| [log(d).exp(); 3])
         };
         let still = rows(&wave(0.0));
@@ -224,11 +228,11 @@ mod tests {
             let (cosine, sine) = rows.iter().fold((0.0, 0.0), |(c, s), row| (c + row[5], s + row[6]));
             sine.atan2(cosine)
         };
-        for turn in [0.1f32, -0.3, 0.9] {
+        for rotation in [0.1f32, -0.3, 0.9] {
             // columns run against the azimuth
-            let off = phase(&rows(&wave(turn))) - phase(&still) + 3.0 * f64::from(turn);
+            let off = phase(&rows(&wave(rotation))) - phase(&still) + 3.0 * f64::from(rotation);
             let off = (off + PI).rem_euclid(2.0 * PI) - PI;
-            assert!(off.abs() < 0.02, "{turn}: off by {off}");
+            assert!(off.abs() < 0.02, "{rotation}: off by {off}");
         }
     }
 

@@ -6,7 +6,7 @@
 //! | reading, expanding, checking, resampling | [`examine`] |
 //! | the same file twice | [`content_hash`] |
 //! | the same capture by name | [`capture`] |
-//! | the same light by content, turned, mirrored or at another exposure | [`Fingerprint`] |
+//! | the same light by content, rotated, mirrored or at another exposure | [`Fingerprint`] |
 //! | what must stay together, and where it goes | [`group`], [`assign`] |
 
 mod capture;

@@ -45,7 +45,7 @@ fn copies_are_found_and_other_places_are_not() {
             );
         }
     }
-    let mut turned_back = 0;
+    let mut rotated_back = 0;
     for (panorama, print) in originals.iter().zip(&prints) {
         let alike = |other: &Panorama| print.unpack().near_duplicate(&Fingerprint::new(other).unpack());
         let mut bright = panorama.clone();
@@ -53,17 +53,17 @@ fn copies_are_found_and_other_places_are_not() {
         for copy in [
             bright,
             panorama.resample(Equirect::new(100, 50)),
-            panorama.turn(2.345),
-            panorama.mirror().turn(-1.0),
+            panorama.rotated(2.345),
+            panorama.mirror().rotated(-1.0),
             clipped(panorama),
         ] {
             assert!(alike(&copy).is_some(), "{:?}", print.likeness(&Fingerprint::new(&copy)));
         }
-        let turn = alike(&panorama.turn(2.345)).unwrap();
-        turned_back += usize::from(!turn.mirrored && (turn.turn - 2.345).abs() < 0.05);
+        let found = alike(&panorama.rotated(2.345)).unwrap();
+        rotated_back += usize::from(!found.mirrored && (found.rotation - 2.345).abs() < 0.05);
         assert!(alike(&panorama.mirror()).unwrap().mirrored);
     }
-    assert_eq!(turned_back, originals.len(), "the turn is found");
+    assert_eq!(rotated_back, originals.len(), "the rotation is found");
 }
 
 #[test]
@@ -80,8 +80,9 @@ fn the_bound_spares_comparisons_and_loses_none() {
 #[test]
 fn captures_and_copies_are_joined_through_each_other() {
     let originals = panoramas();
-    let prints: Vec<_> =
-        [&originals[0], &originals[1], &originals[0].turn(1.0), &originals[2]].map(Fingerprint::new).into();
+    let prints: Vec<_> = [&originals[0], &originals[1], &originals[0].rotated(1.0), &originals[2]]
+        .map(Fingerprint::new)
+        .into();
     let members: Vec<_> = (["b", "a", "c", "c"].into_iter().zip(&prints))
         .map(|(capture, fingerprint)| Member { capture, fingerprint })
         .collect();

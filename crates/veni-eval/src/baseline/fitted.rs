@@ -47,12 +47,12 @@ impl Fitted {
     /// The fit of `system` that [`Fitted::parameters`] of it describes.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if it is not [`Baseline::dimension`] numbers or one of them is not finite.
+    /// [`Error::Invalid`] if it is not [`Baseline::dimension`] coefficients or one of them is not finite.
     pub fn from_parameters(system: &Baseline, parameters: &[f64]) -> Result<Self> {
         let (expected, given) = (system.dimension(), parameters.len());
         if given != expected || parameters.iter().any(|v| !v.is_finite()) {
             return Err(Error::invalid(format!(
-                "a baseline of {expected} numbers cannot be made from these {given}: each must be finite"
+                "a baseline of {expected} coefficients cannot be made from these {given}: each must be finite"
             )));
         }
         let (triples, _) = parameters.as_chunks::<3>();

@@ -1,7 +1,7 @@
 //! The systems that VENI is compared with: an image's own expansion in spherical harmonics or spherical Gaussians, given
 //! the latent dimension D of a model. No prior, no training, no tensors.
 //!
-//! | system | what is expanded | numbers |
+//! | system | what is expanded | coefficients |
 //! |---|---|---|
 //! | [`Kind::SphericalHarmonics`] | log radiance or radiance ([`Space`]) | 3(L+1)² |
 //! | [`Kind::SphericalGaussians`] | the same, in lobes of either sign | 6 per lobe + 3 |

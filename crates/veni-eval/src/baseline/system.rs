@@ -21,14 +21,14 @@ pub enum Kind {
 /// A system to compare with; see the [module](super).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Baseline {
-    /// Real spherical harmonics up to order L: 3(L+1)² numbers. Solved in closed form.
+    /// Real spherical harmonics up to order L: 3(L+1)² coefficients. Solved in closed form.
     SphericalHarmonics {
         /// L.
         order: usize,
         /// What is expanded.
         space: Space,
     },
-    /// f = b + Σ_g a_g e^{λ_g(⟨μ_g,d⟩−1)}, a of either sign: 6 numbers per lobe and 3 for b.
+    /// f = b + Σ_g a_g e^{λ_g(⟨μ_g,d⟩−1)}, a of either sign: 6 coefficients per lobe and 3 for b.
     SphericalGaussians {
         /// K.
         lobes: usize,
@@ -37,7 +37,7 @@ pub enum Baseline {
         /// How the lobes are searched.
         search: Search,
     },
-    /// L = b + Σ_g a_g e^{λ_g(⟨μ_g,d⟩−1)} with a, b > 0, and the squared error of ln L least: 6 numbers per lobe and 3
+    /// L = b + Σ_g a_g e^{λ_g(⟨μ_g,d⟩−1)} with a, b > 0, and the squared error of ln L least: 6 coefficients per lobe and 3
     /// for b.
     GaussianMixture {
         /// K.
@@ -48,16 +48,16 @@ pub enum Baseline {
 }
 
 impl Baseline {
-    /// The largest system of this kind that spends at most `dimension` numbers: harmonics of order ⌊√(D/3)⌋ − 1,
-    /// or ⌊(D−3)/6⌋ lobes and a constant. D = 27, 147, 300 give L = 2, 6, 9 (27, 147, 300 numbers) and
-    /// K = 4, 24, 49 (27, 147, 297 numbers). A mixture expands radiance by definition; `space` is for the others.
+    /// The largest system of this kind of at most `dimension` coefficients: harmonics of order ⌊√(D/3)⌋ − 1,
+    /// or ⌊(D−3)/6⌋ lobes and a constant. D = 27, 147, 300 give L = 2, 6, 9 (27, 147, 300 coefficients) and
+    /// K = 4, 24, 49 (27, 147, 297). A mixture expands radiance by definition; `space` is for the others.
     ///
     /// # Errors
     /// [`Error::Invalid`] if not even a constant fits into `dimension`.
     pub fn from_dimension(kind: Kind, dimension: usize, space: Space) -> Result<Self> {
         if dimension < 3 {
             return Err(Error::invalid(format!(
-                "a baseline of {dimension} numbers: a constant colour already takes 3"
+                "a baseline of dimension {dimension}: a constant colour already takes 3"
             )));
         }
         let (lobes, search) = ((dimension - 3) / 6, Search::default());

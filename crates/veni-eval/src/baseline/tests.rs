@@ -43,7 +43,7 @@ fn a_dimension_is_spent_as_said() {
 }
 
 #[test]
-fn every_system_improves_with_its_size_and_counts_its_numbers() {
+fn every_system_improves_with_its_size_and_counts_its_coefficients() {
     let grid = Equirect::new(32, 16);
     let image = sky(grid);
     for kind in [Kind::SphericalHarmonics, Kind::SphericalGaussians, Kind::GaussianMixture] {
@@ -72,14 +72,15 @@ fn harmonics_are_their_own_best_fit_whatever_the_grid() {
 }
 
 #[test]
-fn a_turned_image_has_the_turned_fit() {
+fn a_rotated_image_has_the_rotated_fit() {
     let grid = Equirect::new(32, 16);
     let image = sky(grid);
-    let turned: Vec<f32> = image.chunks_exact(96).flat_map(|row| [&row[15..], &row[..15]].concat()).collect();
+    let rotated: Vec<f32> =
+        image.chunks_exact(96).flat_map(|row| [&row[15..], &row[..15]].concat()).collect();
     for space in [Space::Log, Space::Linear] {
         let baseline = Baseline::SphericalHarmonics { order: 4, space };
         let [a, b] =
-            [&image, &turned].map(|i| baseline.fit(grid, i).unwrap().log_radiance(&grid.directions()));
+            [&image, &rotated].map(|i| baseline.fit(grid, i).unwrap().log_radiance(&grid.directions()));
         for (p, pixel) in b.iter().enumerate() {
             let from = p / 32 * 32 + (p + 5) % 32;
             assert!((0..3).all(|c| (pixel[c] - a[from][c]).abs() < 1e-4), "{space:?}, pixel {p}");

@@ -16,7 +16,7 @@ pub struct Basis {
 }
 
 impl Basis {
-    /// The largest system of this kind, in log radiance, that spends at most `dimension` numbers.
+    /// The largest system of this kind, in log radiance, of at most `dimension` coefficients.
     ///
     /// # Errors
     /// As [`Baseline::from_dimension`].

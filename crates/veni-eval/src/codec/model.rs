@@ -68,7 +68,7 @@ impl Codec for Autoencoder<'_> {
     }
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
-        Ok(numbers(&self.subject.encode(grid, &[image])?))
+        Ok(coordinates(&self.subject.encode(grid, &[image])?))
     }
 
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>> {
@@ -116,7 +116,7 @@ impl Codec for Optimised<'_> {
             log_exposure: z.log_exposure + rest.code.log_exposure,
             ..z
         };
-        Ok(numbers(&fitted.into_iter().map(whole).collect::<Vec<_>>()))
+        Ok(coordinates(&fitted.into_iter().map(whole).collect::<Vec<_>>()))
     }
 
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>> {
@@ -124,12 +124,12 @@ impl Codec for Optimised<'_> {
     }
 }
 
-/// The numbers of a light.
+/// The parameters of a light.
 const LIGHT: usize = 7;
 
 /// The coordinates of a single latent; then, of one with lights, its log exposure, whether the first light is the sun, and seven
-/// numbers of each.
-fn numbers(latents: &[Latent]) -> Vec<f32> {
+/// parameters of each.
+fn coordinates(latents: &[Latent]) -> Vec<f32> {
     let mut all: Vec<f32> = latents.iter().flat_map(|z| z.vectors.iter().flatten().copied()).collect();
     for z in latents.iter().filter(|z| !z.lights.is_empty()) {
         all.extend([z.log_exposure, f32::from(u8::from(z.lights.sun().is_some()))]);
@@ -140,7 +140,7 @@ fn numbers(latents: &[Latent]) -> Vec<f32> {
     all
 }
 
-/// A code's numbers as a latent of the model.
+/// A code's coordinates as a latent of the model.
 pub(crate) fn latent(subject: &LoadedModel, code: &[f32]) -> Latent {
     let (vectors, lights) = code.split_at(3 * subject.latent_vectors());
     let light = |n: &[f32; LIGHT]| CompactLight::new([n[0], n[1], n[2]], [n[3], n[4], n[5]], n[6]);

@@ -20,7 +20,7 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     for subject in run.subjects {
         let size = subject.training_panoramas().ok_or_else(|| {
             Error::invalid(
-                "its file does not say on how many panoramas it was trained; leave this model out, or train it anew: a \
+                "its file does not say on how many panoramas it was trained; leave this model out, or train it again: a \
                  training run records it",
             )
             .in_file(subject.name())

@@ -1,10 +1,10 @@
-//! `equivariance`: does the latent turn with the panorama, and the decoded panorama with the latent?
+//! `equivariance`: does the latent rotate with the panorama, and the decoded panorama with the latent?
 //!
-//! - Encoder: |Z(turned image) − turned Z(image)|/|Z|, for turns by whole stripes, by half a stripe, and for the mirror
+//! - Encoder: |Z(rotated image) − rotated Z(image)|/|Z|, for rotations by whole stripes, by half a stripe, and for the mirror
 //!   image; the worst and the mean over panoramas.
-//! - Decoder: the largest difference of log radiance between the turned (mirrored) latent in turned (mirrored) directions
+//! - Decoder: the largest difference of log radiance between the rotated (mirrored) latent in rotated (mirrored) directions
 //!   and the latent itself, over latents, 36 angles and a 64 × 32 grid.
-//! - Whole model: panorama turned by five stripes, encoded, decoded, against the reconstruction turned by five stripes.
+//! - Whole model: panorama rotated by five stripes, encoded, decoded, against the reconstruction rotated by five stripes.
 
 use std::f64::consts::TAU;
 
@@ -15,14 +15,14 @@ use crate::Result;
 use crate::figure::{Axis, Plot, Series};
 use crate::table::{Cell, Table};
 use veni_core::LoadedModel;
-use veni_data::augment::{mirror, turn_columns};
+use veni_data::augment::{mirror, rotate_columns};
 use veni_data::parallel::parallel;
 use veni_light::latent::{Latent, Prior};
 use veni_light::sphere::Equirect;
 
 /// Latents that stand for all where there is no encoder to give some.
 const DRAWN: u64 = 4;
-/// Why a stripe cannot be turned by.
+/// Why a stripe cannot be rotated by.
 const NARROW: &str = "stripes are not a whole number of pixels";
 
 /// Table: one row per measure, one column per model; per model with an encoder the error over the angle as a curve.
@@ -56,20 +56,20 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     report.tables = vec![table];
     if !curves.is_empty() {
         let axes =
-            [Axis::linear("turn in stripes"), Axis::logarithmic("relative error of the latent (mean)")];
+            [Axis::linear("rotation in stripes"), Axis::logarithmic("relative error of the latent (mean)")];
         let plot = Plot { title: "Equivariance of the encoder".to_owned(), axes, series: curves };
         run.plot("equivariance", &plot, &mut report)?;
     }
     Ok(report)
 }
 
-/// Mean relative error of the latent over panoramas turned by one stripe, if there is an encoder and a stripe is a whole
+/// Mean relative error of the latent over panoramas rotated by one stripe, if there is an encoder and a stripe is a whole
 /// number of columns.
 pub(super) fn by_one_stripe(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<Cell> {
     Ok(match Encoding::of(run, subject)? {
         None => Cell::missing("no encoder"),
         Some(encoding) if encoding.stripe == 0 => Cell::missing(NARROW),
-        Some(encoding) => Cell::Scientific(mean(&encoding.turned(encoding.stripe)?)),
+        Some(encoding) => Cell::Scientific(mean(&encoding.rotated(encoding.stripe)?)),
     })
 }
 
@@ -102,9 +102,9 @@ impl<'a> Encoding<'a> {
         Ok(latents.iter().zip(&self.latents).map(|(z, base)| relative(z, &expected(base))).collect())
     }
 
-    fn turned(&self, columns: usize) -> Result<Vec<f64>> {
+    fn rotated(&self, columns: usize) -> Result<Vec<f64>> {
         let angle = -TAU * columns as f64 / self.grid.width as f64;
-        self.errors(|image| turn_columns(self.grid, image, columns), |z| z.turned(angle))
+        self.errors(|image| rotate_columns(self.grid, image, columns), |z| z.rotated(angle))
     }
 }
 
@@ -113,7 +113,7 @@ type Measures = Vec<(&'static str, Cell)>;
 fn encoder(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<(Measures, Option<Series>)> {
     let names = [
         ["encoder, one stripe, worst", "encoder, one stripe, mean"],
-        ["encoder, a quarter turn, worst", "encoder, a quarter turn, mean"],
+        ["encoder, rotated by 90°, worst", "encoder, rotated by 90°, mean"],
         ["encoder, half a stripe, worst", "encoder, half a stripe, mean"],
         ["encoder, mirrored, worst", "encoder, mirrored, mean"],
     ];
@@ -130,12 +130,12 @@ fn encoder(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<(Measures, Opt
         Some(errors) => [worst(&errors), mean(&errors)].map(Cell::Scientific),
         None => [(); 2].map(|()| Cell::missing(why)),
     };
-    let turned = |columns: usize, possible: bool| possible.then(|| encoding.turned(columns)).transpose();
+    let rotated = |columns: usize, possible: bool| possible.then(|| encoding.rotated(columns)).transpose();
     let cells = [
-        pair(turned(stripe, stripe > 0)?, NARROW),
-        pair(turned(grid.width / 4, stripe > 0 && grid.width.is_multiple_of(4 * stripe))?, NARROW),
+        pair(rotated(stripe, stripe > 0)?, NARROW),
+        pair(rotated(grid.width / 4, stripe > 0 && grid.width.is_multiple_of(4 * stripe))?, NARROW),
         pair(
-            turned(stripe / 2, stripe > 1 && stripe.is_multiple_of(2))?,
+            rotated(stripe / 2, stripe > 1 && stripe.is_multiple_of(2))?,
             "half a stripe is not a whole number of pixels",
         ),
         pair(Some(encoding.errors(|image| mirror(grid, image), Latent::mirrored)?), ""),
@@ -145,19 +145,19 @@ fn encoder(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<(Measures, Opt
     measures.push((WHOLE, if stripe > 0 { whole_model(&encoding)? } else { Cell::missing(NARROW) }));
     let mut points = Vec::new();
     for columns in 1..=(4 * stripe).min(grid.width - 1) {
-        points.push([columns as f64 / stripe as f64, mean(&encoding.turned(columns)?)]);
+        points.push([columns as f64 / stripe as f64, mean(&encoding.rotated(columns)?)]);
     }
     Ok((measures, Some(Series { name: subject.name().to_owned(), points, joined: true })))
 }
 
 fn whole_model(encoding: &Encoding<'_>) -> Result<Cell> {
     let (grid, columns) = (encoding.grid, 5 * encoding.stripe % encoding.grid.width);
-    let turn = |image: &[f32]| with(image, |image| turn_columns(grid, image, columns));
-    let turned: Vec<_> = encoding.images.iter().map(|image| turn(image)).collect();
-    let turned: Vec<_> = turned.iter().map(Vec::as_slice).collect();
-    let again = encoding.subject.decode(grid, &encoding.subject.encode(grid, &turned)?)?;
+    let rotate = |image: &[f32]| with(image, |image| rotate_columns(grid, image, columns));
+    let rotated: Vec<_> = encoding.images.iter().map(|image| rotate(image)).collect();
+    let rotated: Vec<_> = rotated.iter().map(Vec::as_slice).collect();
+    let again = encoding.subject.decode(grid, &encoding.subject.encode(grid, &rotated)?)?;
     let once = encoding.subject.decode(grid, &encoding.latents)?;
-    let largest = again.iter().zip(&once).map(|(a, b)| largest(a, &turn(b)));
+    let largest = again.iter().zip(&once).map(|(a, b)| largest(a, &rotate(b)));
     Ok(Cell::Scientific(largest.fold(0.0, f64::max)))
 }
 
@@ -171,13 +171,13 @@ fn decoder(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<Measures> {
                 .collect()
         }
     };
-    let turned = parallel(36, |step| {
+    let rotated = parallel(36, |step| {
         let angle = 0.01 + TAU * step as f64 / 36.0;
         let (sin, cos) = angle.sin_cos();
         against(
             subject,
             &latents,
-            |z| z.turned(angle),
+            |z| z.rotated(angle),
             |[x, y, z]| {
                 let (x, y) = (f64::from(x), f64::from(y));
                 [(x * cos - y * sin) as f32, (x * sin + y * cos) as f32, z]
@@ -186,7 +186,7 @@ fn decoder(run: &Evaluation<'_>, subject: &LoadedModel) -> Result<Measures> {
     })?;
     let mirrored = against(subject, &latents, Latent::mirrored, |[x, y, z]| [x, -y, z])?;
     Ok(vec![
-        ("decoder, turned", Cell::Scientific(worst(&turned))),
+        ("decoder, rotated", Cell::Scientific(worst(&rotated))),
         ("decoder, mirrored", Cell::Scientific(mirrored)),
     ])
 }

@@ -17,11 +17,11 @@ use crate::store::Key;
 use crate::table::{Cell, Table};
 use crate::{Error, Result};
 use veni_core::LoadedModel;
-use veni_core::fit::{FitConfig, FitResult, fit_shaded, matching_exposure};
+use veni_core::fit::{FitConfig, FitResult, fit_rendered, matching_exposure};
 use veni_data::{Item, Part};
 use veni_fit::shade::{
-    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedImage, ShadedLoss, ShadingForm, Surface,
-    Transfer,
+    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm,
+    Surface, Transfer,
 };
 use veni_image::Panorama;
 use veni_image::metrics::{Alignment, psnr};
@@ -65,12 +65,12 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
         |first: &[&'static str]| [first, &["*PSNR of log radiance"], &quality::COLUMNS[..]].concat();
     let mut means = Table::new(
         "inverse-rendering",
-        "Light from a shaded ball",
+        "Light from the rendered image of a ball",
         &columns(&["System", "D", "K_s", "loss of the picture"]),
     );
     let mut each = Table::new(
         "inverse-rendering-images",
-        "Light from a shaded ball, each panorama",
+        "Light from the rendered image of a ball, each panorama",
         &columns(&["Panorama", "System", "K_s", "loss of the picture"]),
     );
     let mut curves = Vec::new();
@@ -93,7 +93,7 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
         run.sheet(&format!("inverse-rendering-{}", subject.name()), &sheet.sheet, &mut report)?;
     }
     let axes = [Axis::linear("K_s"), Axis::linear("LDR PSNR (exp.), dB")];
-    let plot = Plot { title: "Light from a shaded ball".to_owned(), axes, series: curves };
+    let plot = Plot { title: "Light from the rendered image of a ball".to_owned(), axes, series: curves };
     run.plot("inverse-rendering", &plot, &mut report)?;
     means.note(format!(
         "A ball of {side} × {side} pixels, shininess {SHININESS}, under {lights} × {half} lights; {steps} Adam steps from \
@@ -201,15 +201,21 @@ fn light(grid: Equirect, item: &Item, set: Set) -> Panorama {
 fn fitted(subject: &LoadedModel, grid: Equirect, item: &Item, set: Set, ks: f32) -> Result<Found> {
     let transfer = ball(set, ks)?;
     let picture = transfer.render(light(grid, item, set).pixels());
-    let image = ShadedImage::new(transfer, &picture, ShadedLoss::default())?;
+    let image = RenderedImage::new(transfer, &picture, RenderingLoss::default())?;
     let mut start = Latent::new(vec![[0.0; 3]; subject.latent_vectors()]);
     let small = Equirect::new(set.lights, set.lights / 2);
     let dark = subject.decode(small, std::slice::from_ref(&start))?.concat();
     start.log_exposure = matching_exposure(&image, &picture, dark.as_chunks().0);
     let config = FitConfig { prior: PRIOR, free_exposure: true, ..FitConfig::light().in_steps(set.steps) };
     let (images, prior, starts) = ([image], subject.prior(), [start]);
-    let FitResult { latents, last, .. } =
-        fit_shaded(subject.fit_decoder().as_dyn(), &images, Some(&prior), &starts, &config, &mut |_, _| {})?;
+    let FitResult { latents, last, .. } = fit_rendered(
+        subject.fit_decoder().as_dyn(),
+        &images,
+        Some(&prior),
+        &starts,
+        &config,
+        &mut |_, _| {},
+    )?;
     let vectors = latents.into_iter().next().map(|z| z.vectors).unwrap_or_default();
     Ok(Found { vectors, loss: last.into_iter().sum() })
 }

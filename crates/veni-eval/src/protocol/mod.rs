@@ -6,7 +6,7 @@
 //! | [`uniqueness`] | do two fits of one panorama end in the same place of latent space? |
 //! | [`consistency`] | are latents that are far apart panoramas that are far apart? |
 //! | [`interpolation`] | is the way from one panorama to another even? |
-//! | [`equivariance`] | does the latent turn with the panorama? |
+//! | [`equivariance`] | does the latent rotate with the panorama? |
 //! | [`dataset_size`] | what is more training data worth? |
 //! | [`ablations`] | what is each part of the model worth? |
 //! | [`light`] | does what is decoded light things as the panorama does? |

@@ -197,7 +197,7 @@ fn decoders_alone_take_part_without_an_encoder() {
     assert!(number(table, "encoder, half a stripe, mean", "whole") > 1e-3);
     assert_eq!(table.cell("encoder, one stripe, worst", "alone"), Some(&Cell::missing("no encoder")));
     for name in ["whole", "alone"] {
-        assert!(number(table, "decoder, turned", name) < 1e-4, "{table:?}");
+        assert!(number(table, "decoder, rotated", name) < 1e-4, "{table:?}");
         assert!(number(table, "decoder, mirrored", name) < 1e-4);
     }
     assert!(number(table, "whole model, five stripes", "whole") < 1e-4);

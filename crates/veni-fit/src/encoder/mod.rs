@@ -8,8 +8,8 @@
 //! 5. `project_out` gives μ; `project_log_variance` gives vectors w with ln σ² = |w_xy| + w_z.
 //!
 //! A vector feature is `[token, coordinate, channel]`, row-major, so that a linear map of Vector Neurons is one plain
-//! matrix product. Turning all directions about z turns the latent by the same angle; the order of stripes does not
-//! matter. Hence a panorama rolled by whole stripes gives the turned latent exactly.
+//! matrix product. Rotating all directions about z rotates the latent by the same angle; the order of stripes does not
+//! matter. Hence a panorama rolled by whole stripes gives the rotated latent exactly.
 
 mod attention;
 mod feed_forward;

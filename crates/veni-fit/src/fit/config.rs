@@ -48,8 +48,8 @@ pub enum Method {
     Auto,
 }
 
-/// [`Objective::Energy`]'s share by default: docs/RESULTS.md, Where the light comes from.
-const SHARE: f64 = 0.05;
+/// [`Objective::Energy`]'s weight by default: docs/results/light.md, "The energy weight of a fit".
+const ENERGY_WEIGHT: f64 = 0.05;
 /// Weight of the prior beside integrals of light: it decides what they leave open, and gives way where they do not.
 const LINEAR_PRIOR: f64 = 1e-6;
 /// Most latent vectors of a small code, which [`Method::Auto`] fits without exploring.
@@ -68,7 +68,7 @@ impl Method {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plateau {
-    /// So many updates without an improvement end the fit.
+    /// The number of updates without an improvement that ends the fit.
     pub patience: u64,
     /// A loss counts as better if it is below the best so far by this fraction of it.
     pub improvement: f64,
@@ -95,13 +95,14 @@ pub enum Objective {
         /// Weight of the log error, which keeps what the display clips in place.
         log: f64,
     },
-    /// (1 − `share`) · [`Objective::LogError`] + `share` · Σ ω m (L/L̄) ρ(P − I)/Σ ω m, L being a pixel's luminance, L̄ its
+    /// (1 − `weight`) · [`Objective::LogError`] + `weight` · Σ ω m (L/L̄) ρ(P − I)/Σ ω m, L being a pixel's luminance, L̄ its
     /// mean over ω m, and ρ(e) = 2 (√(1 + e²) − 1): a pixel counts by its area and a little by the light that comes from
     /// it, where ρ (e² for small e, a line for large ones) keeps a sun that the decoder cannot follow from dragging the
     /// rest along. For light that is to illuminate something: a sun is a thousandth of the sphere and half of its light.
     Energy {
-        /// Part of the weight that goes by light, in [0, 1].
-        share: f64,
+        /// Energy weight: the part of the weight that goes by light, in [0, 1].
+        #[serde(alias = "share")]
+        weight: f64,
     },
     /// mean((m P − m I)²) over all pixels alike: the reference's helper.
     ReferenceLogError,
@@ -148,10 +149,10 @@ impl FitConfig {
 
     /// As [`FitConfig::thorough`], with an eye to where the light comes from: for use.
     pub fn energy() -> Self {
-        Self { objective: Objective::Energy { share: SHARE }, ..Self::thorough() }
+        Self { objective: Objective::Energy { weight: ENERGY_WEIGHT }, ..Self::thorough() }
     }
 
-    /// For the light on a surface ([`fit_shaded`](super::fit_shaded)), whose loss is not a sum over the light's pixels.
+    /// For the light on a surface ([`fit_rendered`](super::fit_rendered)), whose loss is not a sum over the light's pixels.
     pub fn light() -> Self {
         Self { method: Method::Adam, learning_rate: exponential(5e-2, 2e-3, 400), ..Self::thorough() }
     }
@@ -233,10 +234,10 @@ impl FitConfig {
         if let Some(plateau) = self.plateau {
             numbers.push(("plateau.improvement", plateau.improvement, true));
         }
-        if let Objective::Energy { share } = self.objective
-            && !(0.0..=1.0).contains(&share)
+        if let Objective::Energy { weight } = self.objective
+            && !(0.0..=1.0).contains(&weight)
         {
-            return Err(Error::invalid(format!("objective.energy.share = {share}: must lie in 0..=1")));
+            return Err(Error::invalid(format!("objective.energy.weight = {weight}: must lie in 0..=1")));
         }
         if let Objective::Display { log } = self.objective {
             numbers.push(("objective.display.log", log, true));

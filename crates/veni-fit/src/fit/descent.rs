@@ -41,7 +41,7 @@ pub(super) fn optimise(
 fn unsuited(loss: &ImageLoss<'_>) -> Error {
     let why = match loss {
         ImageLoss::Whole(_) => "the objective looks at whole images",
-        ImageLoss::Shaded(_) => "the light on a surface is seen mixed, not pixel by pixel",
+        ImageLoss::Rendered(_) => "the light on a surface is seen mixed, not pixel by pixel",
         ImageLoss::Pixels(_) | ImageLoss::Linear(_) => "this decoder cannot be folded",
     };
     Error::invalid(format!("the method levenberg-marquardt does not apply: {why}; use adam, or auto"))
@@ -63,8 +63,8 @@ impl Penalty<'_> {
         (self.scale * energy, gradient.as_flattened().iter().map(|s| self.scale * s).collect())
     }
 
-    /// Its second derivatives, [3N, 3N]: the same everywhere, since it is a quadratic.
-    fn curvature(&self) -> Vec<f64> {
+    /// Its Hessian, [3N, 3N]: the same everywhere, since it is a quadratic.
+    fn hessian(&self) -> Vec<f64> {
         let n = self.prior.latent_vectors();
         let mut vectors = vec![[0.0; 3]; n];
         let (_, origin) = self.at(&vectors);
@@ -159,11 +159,11 @@ impl Descent<'_> {
         steps: u64,
         trace: &mut Trace<'_>,
     ) -> Result<Vec<Latent>> {
-        let (curvature, free) = (self.penalty.curvature(), self.config.free_exposure);
+        let (hessian, free) = (self.penalty.hessian(), self.config.free_exposure);
         let evaluate = |latent: &Latent, b: usize| -> Result<QuadraticModel> {
             let found = self.network.equations(latent, self.loss, b)?;
             let (value, by) = self.penalty.at(&latent.vectors);
-            Ok(QuadraticModel::new(found, free).plus(value, &by, &curvature))
+            Ok(QuadraticModel::new(found, free).plus(value, &by, &hessian))
         };
         let begin = |(b, latent): (usize, &Latent)| -> Result<Search> {
             Ok(Search::new(latent.clone(), evaluate(latent, b)?))

@@ -41,11 +41,11 @@ impl QuadraticModel {
     }
 
     /// With a penalty on the vectors' coordinates added.
-    pub(super) fn plus(mut self, value: f64, gradient: &[f64], curvature: &[f64]) -> Self {
+    pub(super) fn plus(mut self, value: f64, gradient: &[f64], hessian: &[f64]) -> Self {
         let (n, m) = (self.gradient.len(), gradient.len());
         self.value += value;
         self.gradient.iter_mut().zip(gradient).for_each(|(g, by)| *g += by);
-        for (row, more) in self.matrix.chunks_exact_mut(n).zip(curvature.chunks_exact(m)) {
+        for (row, more) in self.matrix.chunks_exact_mut(n).zip(hessian.chunks_exact(m)) {
             row.iter_mut().zip(more).for_each(|(h, more)| *h += more);
         }
         self

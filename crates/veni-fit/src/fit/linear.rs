@@ -6,7 +6,7 @@ use super::{FitConfig, FitResult, LatentDecoder, LinearTarget, check_prior, chec
 use crate::{Error, Result};
 use veni_light::latent::{Latent, Prior};
 
-/// The prior's weight is a million times what it is in the end at first, and falls in so many steps to that. The latents that
+/// The prior's weight is a million times what it is in the end at first, and falls to that in these steps. The latents that
 /// integrals leave open form a curved valley, along which a weak prior leads only by short steps; a strong one leads near its
 /// likely end before there is a valley.
 const FALL: [f64; 4] = [1e6, 1e4, 1e2, 1.0];

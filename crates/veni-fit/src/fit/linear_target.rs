@@ -78,8 +78,9 @@ impl LinearTarget {
     /// for some degree L.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if there are harmonics or surfaces already, if their number is no square, if one is not finite, or
-    /// the first one, the mean radiance, is negative or all of it 0; [`Error::TooLarge`] for more than [`MAX_HARMONICS`].
+    /// [`Error::Invalid`] if there are harmonics or surfaces already, if their number is not a square, if one is not
+    /// finite, or the first one, the mean radiance, is negative or all of it 0; [`Error::TooLarge`] for more than
+    /// [`MAX_HARMONICS`].
     pub fn harmonics(mut self, wanted: &[[f64; 3]]) -> Result<Self> {
         if self.count > 0 {
             return Err(Error::invalid("harmonics come first, and once"));
@@ -134,7 +135,7 @@ impl LinearTarget {
             let length = normal.iter().map(|c| f64::from(*c).powi(2)).sum::<f64>().sqrt();
             if !(length > 0.0 && length.is_finite()) {
                 return Err(Error::invalid(format!(
-                    "surface {at} has the normal {normal:?}, which is no direction"
+                    "surface {at} has the normal {normal:?}, which is not a direction"
                 )));
             }
             normals.push(normal.map(|c| f64::from(c) / length));

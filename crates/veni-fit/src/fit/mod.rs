@@ -13,7 +13,7 @@ mod linear_target;
 mod network;
 mod pixel;
 mod plateau;
-mod shaded;
+mod rendered;
 mod starts;
 mod target;
 #[cfg(test)]
@@ -23,7 +23,7 @@ pub use config::{FitConfig, Method, Objective, Plateau};
 pub use decoder::{DecoderPasses, LatentDecoder, LatentGradient, PanoramaLoss};
 pub use linear::{fit_linear, likely_linear};
 pub use linear_target::{Achieved, LinearTarget, Received};
-pub use shaded::{fit_shaded, matching_exposure};
+pub use rendered::{fit_rendered, matching_exposure};
 pub use starts::{Best, best_light, best_linear, best_of, from_each, random_starts};
 pub use target::FitTarget;
 

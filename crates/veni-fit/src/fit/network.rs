@@ -6,7 +6,7 @@ use veni_light::latent::Latent;
 use super::decoder::{DecoderPasses, FoldedPasses, LatentDecoder, LatentGradient, PanoramaLoss};
 use super::linear_target::LinearTarget;
 use super::pixel::PixelLoss;
-use crate::shade::ShadedImage;
+use crate::shade::RenderedImage;
 use crate::{Error, Result};
 
 /// The images' part of the objective.
@@ -18,7 +18,7 @@ pub(crate) enum ImageLoss<'a> {
     Whole(&'a dyn PanoramaLoss),
     /// The light of each latent through the surface of a photograph. The exposure is a property of the photograph, not of
     /// the light.
-    Shaded(&'a [ShadedImage]),
+    Rendered(&'a [RenderedImage]),
     /// The same integrals of every latent's light.
     Linear(&'a LinearTarget),
 }
@@ -93,7 +93,7 @@ impl<'a> Network<'a> {
                 losses = vec![value; latents.len()];
                 Ok(by_prediction)
             })?,
-            (_, ImageLoss::Shaded(images)) => {
+            (_, ImageLoss::Rendered(images)) => {
                 let mut exposures = Vec::new();
                 let gradient = self.passes().backward(&without_exposure(latents), &mut |prediction| {
                     let lit = lit(prediction, images, latents);
@@ -128,14 +128,14 @@ impl<'a> Network<'a> {
         match loss {
             ImageLoss::Pixels(images) => Ok(field.normal_equations(directions, |i, p| {
                 let value = images[b].at(i, p.map(f64::from));
-                let [gradient, weight] = [value.gradient, value.curvature].map(|v| v.map(|v| v as f32));
+                let [gradient, weight] = [value.gradient, value.gauss_newton].map(|v| v.map(|v| v as f32));
                 LocalQuadratic { loss: value.loss, gradient, weight }
             })),
             ImageLoss::Linear(target) => {
                 let (weights, count) = target.weights();
                 Ok(target.equations(&field.moments(directions, weights, count)))
             }
-            ImageLoss::Whole(_) | ImageLoss::Shaded(_) => {
+            ImageLoss::Whole(_) | ImageLoss::Rendered(_) => {
                 Err(Error::invalid("normal equations are those of pixels or of integrals"))
             }
         }
@@ -146,7 +146,7 @@ impl<'a> Network<'a> {
         Ok(match loss {
             ImageLoss::Whole(whole) => whole.each(&self.passes().forward(latents)?)?,
             ImageLoss::Pixels(images) => pixel_losses(&self.passes().forward(latents)?, images).0,
-            ImageLoss::Shaded(images) => {
+            ImageLoss::Rendered(images) => {
                 lit(&self.passes().forward(&without_exposure(latents))?, images, latents).losses
             }
             ImageLoss::Linear(target) => {
@@ -191,7 +191,7 @@ struct Lit {
     exposures: Vec<f64>,
 }
 
-fn lit(prediction: &[f64], images: &[ShadedImage], latents: &[Latent]) -> Lit {
+fn lit(prediction: &[f64], images: &[RenderedImage], latents: &[Latent]) -> Lit {
     let light: Vec<[f32; 3]> = prediction.as_chunks::<3>().0.iter().map(|p| p.map(|v| v as f32)).collect();
     let each = images.iter().zip(light.chunks_exact(light.len() / images.len())).zip(latents);
     let mut out = Lit::default();

@@ -15,8 +15,8 @@ const REACH: f64 = 1.0;
 pub(super) struct PixelValue {
     pub(super) loss: f64,
     pub(super) gradient: [f64; 3],
-    /// Of the parabola that stands for the loss where a squared error would be one: at least 0.
-    pub(super) curvature: [f64; 3],
+    /// The Gauss–Newton weight: the second derivative of the parabola that stands for the loss. At least 0.
+    pub(super) gauss_newton: [f64; 3],
 }
 
 /// One image's loss: a sum over pixels.
@@ -54,7 +54,7 @@ impl<'a> PixelLoss<'a> {
             }
         };
         let (weights, light) = match objective {
-            Objective::Energy { share } => by_light(image, weights, share),
+            Objective::Energy { weight } => by_light(image, weights, weight),
             _ => (weights, Vec::new()),
         };
         let (white, shown) = match objective {
@@ -82,7 +82,7 @@ impl<'a> PixelLoss<'a> {
             if error > 0.0 && self.clipped.is_some_and(|clipped| clipped[k]) {
                 continue;
             }
-            let (value, gradient, curvature) = match self.objective {
+            let (value, gradient, gauss_newton) = match self.objective {
                 Objective::LogAbsolute => {
                     // the parabola through the same value and gradient that lies above it everywhere
                     let root = error.hypot(ROUNDING);
@@ -106,22 +106,22 @@ impl<'a> PixelLoss<'a> {
             // the mean over the channels
             out.loss += weight / 3.0 * value;
             out.gradient[c] = weight / 3.0 * gradient;
-            out.curvature[c] = weight / 3.0 * curvature;
+            out.gauss_newton[c] = weight / 3.0 * gauss_newton;
         }
         out
     }
 }
 
-/// What is left of the weights, and `share` of their sum dealt out by the light that comes from each pixel.
-fn by_light(image: &[f32], weights: Vec<f64>, share: f64) -> (Vec<f64>, Vec<f64>) {
+/// What is left of the weights, and `energy_weight` of their sum dealt out by the light that comes from each pixel.
+fn by_light(image: &[f32], weights: Vec<f64>, energy_weight: f64) -> (Vec<f64>, Vec<f64>) {
     let luminance = |rgb: &[f32]| f64::from(luminance([0, 1, 2].map(|c| rgb[c].exp())));
     // what is unknown may be anything
     let light =
         image.chunks_exact(3).zip(&weights).map(|(rgb, w)| if *w > 0.0 { w * luminance(rgb) } else { 0.0 });
     let light: Vec<f64> = light.collect();
     let (sum, total) = (weights.iter().sum::<f64>(), light.iter().sum::<f64>());
-    let scale = if total > 0.0 { share * sum / total } else { 0.0 };
-    let rest = weights.into_iter().map(|w| (1.0 - share) * w).collect();
+    let scale = if total > 0.0 { energy_weight * sum / total } else { 0.0 };
+    let rest = weights.into_iter().map(|w| (1.0 - energy_weight) * w).collect();
     (rest, light.into_iter().map(|light| scale * light).collect())
 }
 

@@ -1,11 +1,11 @@
 //! Several starts for one image: the best of them, and how much they disagree.
 
 use super::{
-    FitConfig, FitResult, FitTarget, LatentDecoder, LinearTarget, fit_linear, fit_shaded, fit_with,
+    FitConfig, FitResult, FitTarget, LatentDecoder, LinearTarget, fit_linear, fit_rendered, fit_with,
     likely_linear,
 };
 use crate::Result;
-use crate::shade::ShadedImage;
+use crate::shade::RenderedImage;
 use veni_light::latent::{Latent, Prior};
 use veni_light::random::{Purpose, stream};
 
@@ -52,16 +52,16 @@ pub fn best_of(
     })
 }
 
-/// [`best_of`] for the light on a surface: [`fit_shaded`] of one image from every start.
+/// [`best_of`] for the light on a surface: [`fit_rendered`] of one image from every start.
 ///
 /// # Errors
-/// As [`fit_shaded`].
+/// As [`fit_rendered`].
 ///
 /// # Panics
 /// If there is no start.
 pub fn best_light(
     decoder: &dyn LatentDecoder,
-    image: &ShadedImage,
+    image: &RenderedImage,
     prior: Option<&Prior>,
     starts: &[Latent],
     config: &FitConfig,
@@ -69,7 +69,7 @@ pub fn best_light(
 ) -> Result<Best> {
     let image = std::slice::from_ref(image);
     from_each(starts, config, observer, |start, observer| {
-        fit_shaded(decoder, image, prior, start, config, observer)
+        fit_rendered(decoder, image, prior, start, config, observer)
     })
 }
 

@@ -1,7 +1,7 @@
 //! A photograph of a known surface, and how well a light explains it.
 
 use super::loss::Comparison;
-use super::{ShadedLoss, Transfer};
+use super::{RenderingLoss, Transfer};
 use crate::Result;
 
 /// What the number `log_exposure` = s does to the light.
@@ -44,7 +44,7 @@ pub type Evaluation = (f64, Vec<[f32; 3]>, f64);
 /// let transfer = Transfer::new(&surface, &material, Lights::equirect(grid), ShadingForm::Physical)?;
 /// let photograph = transfer.render(&vec![[2.0, 1.0, 0.5]; grid.len()]);
 ///
-/// let image = ShadedImage::new(transfer, &photograph, ShadedLoss::default())?;
+/// let image = RenderedImage::new(transfer, &photograph, RenderingLoss::default())?;
 /// let log_radiance = vec![[0.0; 3]; grid.len()]; // a decoder's output
 /// let (loss, gradient, by_exposure) = image.evaluate(&log_radiance, 0.0);
 /// // the light should be redder, which is to say: more of channel 0, less of channel 2
@@ -56,20 +56,20 @@ pub type Evaluation = (f64, Vec<[f32; 3]>, f64);
 /// [`Lights::equirect`]: super::Lights::equirect
 /// [`Equirect::directions`]: veni_light::sphere::Equirect::directions
 #[derive(Clone, Debug)]
-pub struct ShadedImage {
+pub struct RenderedImage {
     transfer: Transfer,
     comparison: Comparison,
     exposure: ExposureForm,
 }
 
-impl ShadedImage {
+impl RenderedImage {
     /// A target of linear radiance [H·W, 3], row-major. Only pixels count that show the surface and whose target is
     /// finite.
     ///
     /// # Errors
     /// [`Error::Invalid`](crate::Error::Invalid) if the target is of another size, if nothing of it counts, if it is black,
     /// or if the loss cannot be taken of it.
-    pub fn new(transfer: Transfer, target: &[[f32; 3]], loss: ShadedLoss) -> Result<Self> {
+    pub fn new(transfer: Transfer, target: &[[f32; 3]], loss: RenderingLoss) -> Result<Self> {
         let comparison = Comparison::new(loss, &transfer, target)?;
         Ok(Self { transfer, comparison, exposure: ExposureForm::default() })
     }
@@ -115,7 +115,7 @@ impl ShadedImage {
         (loss, gradient, total * self.exposure.offset(log_exposure).1)
     }
 
-    /// The parts of [`ShadedLoss::ReferenceDisplay`], unweighted: mean squared display error, and 1 − mean cosine. `None`
+    /// The parts of [`RenderingLoss::ReferenceDisplay`], unweighted: mean squared display error, and 1 − mean cosine. `None`
     /// with another loss.
     ///
     /// # Panics

@@ -4,11 +4,11 @@ use super::Transfer;
 use super::transfer::check_image;
 use super::vector::dot;
 use crate::{Error, Result};
-use veni_image::tonemap::{REFERENCE_QUANTILE, quantile, srgb, srgb_slope};
+use veni_image::tonemap::{REFERENCE_QUANTILE, quantile, srgb, srgb_derivative};
 
-/// What [`ShadedImage`](super::ShadedImage) minimises: R is the rendering, T the target, both linear radiance.
+/// What [`RenderedImage`](super::RenderedImage) minimises: R is the rendering, T the target, both linear radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ShadedLoss {
+pub enum RenderingLoss {
     /// The mean over visible pixels and channels of Huber's function of x = ln((R + ε)/(T + ε)): x²/2 up to |x| = `delta`,
     /// then straight, so that pixels which the model cannot explain (shadows, interreflections) pull with a bounded
     /// force. ε is `floor` times the mean of T: what is that dark does not count.
@@ -33,14 +33,14 @@ pub enum ShadedLoss {
     },
 }
 
-impl Default for ShadedLoss {
+impl Default for RenderingLoss {
     /// Robust: quadratic up to a deviation of 10 %.
     fn default() -> Self {
         Self::RobustLog { delta: 0.1, floor: 1e-3 }
     }
 }
 
-impl ShadedLoss {
+impl RenderingLoss {
     /// RENI++'s demonstration with its own weights.
     #[doc(hidden)]
     pub fn demo() -> Self {
@@ -51,7 +51,7 @@ impl ShadedLoss {
 /// A loss for one target, ready to be asked pixel by pixel.
 #[derive(Clone, Debug)]
 pub(super) struct Comparison {
-    loss: ShadedLoss,
+    loss: RenderingLoss,
     /// What the loss needs of each pixel: T + ε, ln T or T. NaN where the pixel does not count.
     target: Vec<[f32; 3]>,
     /// Per pixel and channel.
@@ -62,7 +62,7 @@ pub(super) struct Comparison {
 
 impl Comparison {
     /// A target [H·W, 3] of linear radiance; pixels that are not finite do not count.
-    pub(super) fn new(loss: ShadedLoss, transfer: &Transfer, target: &[[f32; 3]]) -> Result<Self> {
+    pub(super) fn new(loss: RenderingLoss, transfer: &Transfer, target: &[[f32; 3]]) -> Result<Self> {
         check_image(transfer, "the target", target.len())?;
         let known = |p: &[f32; 3]| p.iter().all(|v| v.is_finite());
         let seen: Vec<usize> = transfer.visible().filter(|at| known(&target[*at])).collect();
@@ -72,7 +72,7 @@ impl Comparison {
         let mut prepared = vec![[f32::NAN; 3]; target.len()];
         let everything = target.len() as f64;
         let (share, constant) = match loss {
-            ShadedLoss::RobustLog { delta, floor } => {
+            RenderingLoss::RobustLog { delta, floor } => {
                 for (name, value) in [("delta", delta), ("floor", floor)] {
                     if !(value.is_finite() && value > 0.0) {
                         return Err(Error::invalid(format!(
@@ -88,7 +88,7 @@ impl Comparison {
                 seen.iter().for_each(|at| prepared[*at] = target[*at].map(|v| v.max(0.0) + epsilon));
                 (1.0 / (3.0 * seen.len() as f64), epsilon)
             }
-            ShadedLoss::ReferenceLog => {
+            RenderingLoss::ReferenceLog => {
                 if let Some(at) = seen.iter().find(|at| target[**at].iter().any(|v| *v <= 0.0)) {
                     let width = transfer.size()[0];
                     return Err(Error::invalid(format!(
@@ -101,7 +101,7 @@ impl Comparison {
                 seen.iter().for_each(|at| prepared[*at] = target[*at].map(f32::ln));
                 (100.0 / (3.0 * everything), 0.0)
             }
-            ShadedLoss::ReferenceDisplay { .. } => {
+            RenderingLoss::ReferenceDisplay { .. } => {
                 let mut whole = vec![[1.0; 3]; target.len()];
                 seen.iter().for_each(|at| whole[*at] = target[*at]);
                 let white = quantile(whole.as_flattened(), REFERENCE_QUANTILE);
@@ -127,19 +127,19 @@ impl Comparison {
         let [r, t] = [value, target].map(|v| v.map(f64::from));
         let mut total = 0.0;
         let gradient = match self.loss {
-            ShadedLoss::RobustLog { delta, .. } => [0, 1, 2].map(|c| {
+            RenderingLoss::RobustLog { delta, .. } => [0, 1, 2].map(|c| {
                 let (shifted, delta) = (r[c].max(0.0) + constant, f64::from(delta));
                 let x = (shifted / t[c]).ln();
                 total += share * if x.abs() <= delta { 0.5 * x * x } else { delta * (x.abs() - 0.5 * delta) };
                 share * x.clamp(-delta, delta) / shifted
             }),
-            ShadedLoss::ReferenceLog => [0, 1, 2].map(|c| {
+            RenderingLoss::ReferenceLog => [0, 1, 2].map(|c| {
                 let x = r[c].ln() - t[c];
                 total += share * x.abs();
                 // the subgradient of |x| at 0 is 0
                 if x == 0.0 { 0.0 } else { share * x.signum() / r[c] }
             }),
-            ShadedLoss::ReferenceDisplay { mse, cosine } => {
+            RenderingLoss::ReferenceDisplay { mse, cosine } => {
                 let (parts, gradient) = display(r, t, constant);
                 total += share * (mse * parts[0] + cosine * parts[1]);
                 [0, 1, 2].map(|c| share * (mse * gradient[0][c] + cosine * gradient[1][c]))
@@ -148,9 +148,9 @@ impl Comparison {
         (total, gradient.map(|v| v as f32))
     }
 
-    /// Mean (g(R) − g(T))² and 1 − mean cos(g(R), g(T)) of [`ShadedLoss::ReferenceDisplay`].
+    /// Mean (g(R) − g(T))² and 1 − mean cos(g(R), g(T)) of [`RenderingLoss::ReferenceDisplay`].
     pub(super) fn display_terms(&self, image: &[[f32; 3]]) -> Option<[f64; 2]> {
-        matches!(self.loss, ShadedLoss::ReferenceDisplay { .. }).then(|| {
+        matches!(self.loss, RenderingLoss::ReferenceDisplay { .. }).then(|| {
             let pairs = image.iter().zip(&self.target).filter(|(_, t)| !t[0].is_nan());
             pairs.fold([0.0; 2], |sum, (r, t)| {
                 let (parts, _) = display(r.map(f64::from), t.map(f64::from), f64::from(self.constant));
@@ -164,7 +164,7 @@ impl Comparison {
 fn display(r: [f64; 3], t: [f64; 3], white: f64) -> ([f64; 2], [[f64; 3]; 2]) {
     let shown = |v: [f64; 3]| v.map(|v| f64::from(srgb((v / white) as f32)));
     let (a, b) = (shown(r), shown(t));
-    let derivative = r.map(|v| srgb_slope(v / white) / white);
+    let derivative = r.map(|v| srgb_derivative(v / white) / white);
     let difference = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let square = dot(difference, difference) / 3.0;
     let squares = [0, 1, 2].map(|c| 2.0 / 3.0 * difference[c] * derivative[c]);

@@ -70,7 +70,7 @@ impl NormalMap {
         (length > LENGTHS[0] && length < LENGTHS[1]).then(|| unit_f32(normal)).flatten()
     }
 
-    /// Another size, bilinearly between pixel centres, without averaging where the map shrinks: what the authors do.
+    /// Another size, bilinearly between pixel centres, without averaging where the map shrinks: what the reference implementation does.
     /// Normals of an edge become too short to be [valid](Self::valid).
     #[must_use]
     pub fn resize(&self, width: usize, height: usize) -> Self {

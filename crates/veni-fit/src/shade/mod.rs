@@ -6,7 +6,7 @@
 //!
 //! > R_c = Σ_l f_c(n, v, l) max(n·l, 0) ω_l L_{l,c}
 //!
-//! So a [`Transfer`] knows everything but L: it renders, and takes gradients back. A [`ShadedImage`] compares the
+//! So a [`Transfer`] knows everything but L: it renders, and takes gradients back. A [`RenderedImage`] compares the
 //! result with a photograph and gives the gradient of a loss with respect to log radiance and exposure, which is all
 //! that a fit of a latent to a rendered image needs.
 //!
@@ -17,7 +17,7 @@
 //! | [`Camera`], [`Surface`], [`Mesh`] | rays; normals of a sphere, a triangle mesh |
 //! | [`NormalMap`], [`read_mask`], [`read_albedo`] | a surface from image files |
 //! | [`Transfer`] | light to image, and the transpose |
-//! | [`ShadedImage`], [`ShadedLoss`] | loss and gradients |
+//! | [`RenderedImage`], [`RenderingLoss`] | loss and gradients |
 //!
 //! Directions are unit vectors of one frame that all of these share: the native one of [`veni_light::sphere`] (z up) where
 //! nothing else is said.
@@ -39,9 +39,9 @@ mod vector;
 mod tests;
 
 pub use camera::{Camera, REFERENCE_FIELD_OF_VIEW};
-pub use image::{Evaluation, ExposureForm, ShadedImage};
+pub use image::{Evaluation, ExposureForm, RenderedImage};
 pub use lights::Lights;
-pub use loss::ShadedLoss;
+pub use loss::RenderingLoss;
 pub use maps::{NormalMap, read_albedo, read_mask};
 pub use material::{Colour, Material, Specular};
 pub use raster::Mesh;

@@ -152,7 +152,7 @@ fn pixels_of_one_normal_share_a_row() {
 }
 
 /// Central differences along a few coordinates, and along the exposure.
-fn check_gradient(image: &ShadedImage, log_radiance: &[[f32; 3]], s: f32, name: &str) {
+fn check_gradient(image: &RenderedImage, log_radiance: &[[f32; 3]], s: f32, name: &str) {
     let (_, gradient, exposure) = image.evaluate(log_radiance, s);
     let derivative = |d: &[[f32; 3]], ds: f32| {
         let h = 2e-3;
@@ -179,7 +179,7 @@ fn check_gradient(image: &ShadedImage, log_radiance: &[[f32; 3]], s: f32, name: 
 #[test]
 fn gradients_are_those_of_the_loss() {
     let surface = ball(12);
-    let losses = [ShadedLoss::default(), ShadedLoss::ReferenceLog, ShadedLoss::demo()];
+    let losses = [RenderingLoss::default(), RenderingLoss::ReferenceLog, RenderingLoss::demo()];
     for (loss, exposure) in
         losses.into_iter().zip([ExposureForm::Natural, ExposureForm::Reference, ExposureForm::Natural])
     {
@@ -188,7 +188,7 @@ fn gradients_are_those_of_the_loss() {
             let transfer = Transfer::new(&surface, &material, lights.clone(), ShadingForm::Physical).unwrap();
             // a target of other light, so that no difference is near the kink at 0
             let target = transfer.render(&vec![[9.0, 0.3, 4.0]; lights.len()]);
-            let image = ShadedImage::new(transfer, &target, loss).unwrap().with_exposure(exposure);
+            let image = RenderedImage::new(transfer, &target, loss).unwrap().with_exposure(exposure);
             let log: Vec<_> = sky(&lights).into_iter().map(|p| p.map(f32::ln)).collect();
             check_gradient(&image, &log, -0.4, &format!("{loss:?}, {name}"));
         }
@@ -198,7 +198,7 @@ fn gradients_are_those_of_the_loss() {
 #[test]
 fn the_light_that_made_an_image_has_no_loss() {
     let surface = ball(12);
-    for loss in [ShadedLoss::default(), ShadedLoss::ReferenceLog, ShadedLoss::demo()] {
+    for loss in [RenderingLoss::default(), RenderingLoss::ReferenceLog, RenderingLoss::demo()] {
         let lights = Lights::equirect(Equirect::new(16, 8));
         let material = Material::blinn_phong(Colour::Uniform([0.9; 3]), 0.3, 20.0);
         let transfer = Transfer::new(&surface, &material, lights.clone(), ShadingForm::Physical).unwrap();
@@ -208,7 +208,7 @@ fn the_light_that_made_an_image_has_no_loss() {
         let visible = surface.valid().iter().position(|v| *v).unwrap();
         let hidden = surface.valid().iter().position(|v| !*v).unwrap();
         (target[visible], target[hidden]) = ([f32::NAN; 3], [500.0; 3]);
-        let image = ShadedImage::new(transfer, &target, loss).unwrap();
+        let image = RenderedImage::new(transfer, &target, loss).unwrap();
         let log: Vec<_> = light.iter().map(|p| p.map(f32::ln)).collect();
         let (same, gradient, _) = image.evaluate(&log, 0.0);
         let (brighter, ..) = image.evaluate(&log, 0.5);
@@ -224,14 +224,15 @@ fn what_does_not_fit_together_is_refused() {
     let white = Material::lambert(Colour::Uniform([1.0; 3]));
     let transfer =
         Transfer::new(&surface, &white, Lights::icosahedron(12, false), ShadingForm::Physical).unwrap();
-    let message =
-        |target: &[[f32; 3]], loss| ShadedImage::new(transfer.clone(), target, loss).unwrap_err().to_string();
-    assert!(message(&[[1.0; 3]; 9], ShadedLoss::default()).contains("9 pixels, the surface 8 × 8"));
-    assert!(message(&[[f32::NAN; 3]; 64], ShadedLoss::default()).contains("finite"));
-    for loss in [ShadedLoss::default(), ShadedLoss::ReferenceLog] {
+    let message = |target: &[[f32; 3]], loss| {
+        RenderedImage::new(transfer.clone(), target, loss).unwrap_err().to_string()
+    };
+    assert!(message(&[[1.0; 3]; 9], RenderingLoss::default()).contains("9 pixels, the surface 8 × 8"));
+    assert!(message(&[[f32::NAN; 3]; 64], RenderingLoss::default()).contains("finite"));
+    for loss in [RenderingLoss::default(), RenderingLoss::ReferenceLog] {
         assert!(message(&[[0.0; 3]; 64], loss).contains("target"));
     }
-    let odd = ShadedLoss::RobustLog { delta: 0.0, floor: 1.0 };
+    let odd = RenderingLoss::RobustLog { delta: 0.0, floor: 1.0 };
     assert!(message(&[[1.0; 3]; 64], odd).contains("delta 0"));
     let rays = Camera::reference().rays(2, 2);
     let message = |n: &[[f32; 3]], rays: &[[f32; 3]], mask| {

@@ -11,7 +11,7 @@
 //!
 //! Afterwards the light is measured: a white plane in the open must send up its irradiance over π, which is summed over the pixels
 //! of the panorama, within 1 %; a metre from a pole it must be in the shade away from the sun, and not towards it. A sun of twice the
-//! irradiance and a sun turned by 90° must not pass.
+//! irradiance and a sun rotated by 90° must not pass.
 
 mod camera;
 mod mesh;
@@ -81,9 +81,9 @@ fn still_notices(renderer: &Renderer, sky: &Sky, towards: [f32; 3], expected: [f
     let [x, y, z] = sun.direction;
     let mut doubled = *sun;
     doubled.irradiance = sun.irradiance.map(|e| 2.0 * e);
-    let mut turned = *sun;
-    turned.direction = [z, y, -x];
-    for (sun, what) in [(doubled, "twice as strong"), (turned, "turned")] {
+    let mut rotated = *sun;
+    rotated.direction = [z, y, -x];
+    for (sun, what) in [(doubled, "twice as strong"), (rotated, "rotated")] {
         let wrong = Sky { sun: Some(sun), ..sky.clone() };
         let fault = Measured::of(renderer, &wrong, towards, &[])?.fault(expected, true);
         let fault = fault.ok_or_else(|| format!("a sun {what} is not noticed"))?;

@@ -14,8 +14,8 @@
 //! - **Diffuse surfaces** draw directions by the cosine (`--sampler bsdf`), by `veni_sample_light` (`light`), or half of the
 //!   time by either, with the mean of both densities (`mis`, the balance heuristic with one sample; the light is then sampled by
 //!   what exceeds its mean). Light alone is right only where no direction is black.
-//! - **The turn**: light comes from where it suits the scene, `--turn DEGREES` turns it otherwise: eight bytes for the sampler, a
-//!   turned latent for the field.
+//! - **The rotation**: light comes from where it suits the scene, `--turn DEGREES` rotates it otherwise: eight bytes for the sampler, a
+//!   rotated latent for the field.
 //!
 //! `--compare` traces all three, twice each, with every surface diffuse (a mirror shows the sun whatever the sampler): the variance
 //! of a picture is half the mean square of what two of them differ by, at equal samples, and at the time that `bsdf` takes for
@@ -83,35 +83,35 @@ fn main() -> Result<()> {
 /// All that a host does to have a light on its device, and the model.
 fn sky(opened: &Opened, options: &Options) -> Result<Sky> {
     let Opened { device, queue, .. } = opened;
-    let (light, turn, field) = match &options.panorama {
+    let (light, angle, field) = match &options.panorama {
         Some(path) => {
             let panorama = Panorama::read(path)?;
             let light = Light::of(panorama.environment()?);
-            (light, key_turn(panorama.environment()?), None)
+            (light, key_rotation(panorama.environment()?), None)
         }
         None => {
             let model = Model::load(&options.model)?;
             let latent = Latent::from_seed(&model.prior(), options.seed);
             let pixels = model.decoder()?.condition(&latent)?.bake(GRID);
-            let turn = key_turn(EnvironmentMap::new(GRID, &pixels)?);
+            let angle = key_rotation(EnvironmentMap::new(GRID, &pixels)?);
             // a latent's sun is a wide lobe: the map holds it better than a disc
             let whole = LightOptions { lights: 0, ..LightOptions::default() };
-            (whole.of_pixels(GRID, pixels)?, turn, Some((model, latent)))
+            (whole.of_pixels(GRID, pixels)?, angle, Some((model, latent)))
         }
     };
-    let turn = options.turn.map_or(turn, f64::to_radians);
-    // packed once, turned by eight bytes
+    let angle = options.turn.map_or(angle, f64::to_radians);
+    // packed once, rotated by eight bytes
     let upload = |density| -> Result<GpuLight> {
         let uploaded = GpuLight::new(device, &pack_light(&light, density)?)?;
-        uploaded.turn(queue, turn)?;
+        uploaded.rotate(queue, angle)?;
         Ok(uploaded)
     };
     let lights = [upload(LightDensity::Luminance)?, upload(LightDensity::Compensated)?];
     let field = match field {
         Some((model, latent)) => {
             let decoder = GpuDecoder::new(device, &model)?;
-            // turning the latent turns the light, exactly
-            let latents = decoder.condition(queue, &latent.turned(turn))?;
+            // rotating the latent rotates the light, exactly
+            let latents = decoder.condition(queue, &latent.rotated(angle))?;
             Some((decoder, latents))
         }
         None => None,
@@ -119,9 +119,9 @@ fn sky(opened: &Opened, options: &Options) -> Result<Sky> {
     Ok(Sky { lights, field })
 }
 
-/// The turn that brings most light to where it suits the scene: the azimuth of the upper half's mean direction, weighted by
-/// luminance.
-fn key_turn(map: EnvironmentMap<'_>) -> f64 {
+/// The rotation that brings most light to where it suits the scene: the azimuth of the upper half's mean direction,
+/// weighted by luminance.
+fn key_rotation(map: EnvironmentMap<'_>) -> f64 {
     let (grid, mut x, mut y) = (map.grid(), 0.0, 0.0);
     for (i, pixel) in map.pixels().iter().take(grid.len() / 2).enumerate() {
         let (column, row) = (i % grid.width, i / grid.width);

@@ -104,7 +104,7 @@ impl<'a> Tracer<'a> {
         Self { opened, size, diffuse: options.compare, pipeline, lights, field, scene, view, picture }
     }
 
-    /// The mean of so many paths per pixel, and the seconds that they took.
+    /// The mean of this many paths per pixel, and the seconds that they took.
     pub(crate) fn trace(&self, strategy: Strategy, samples: u32, seed: u32) -> Result<(Vec<[f32; 3]>, f64)> {
         let [width, height] = self.size;
         let rows = (PATHS / width / TILE * TILE).max(TILE);

@@ -88,7 +88,7 @@ impl GpuDecoder {
     /// what is submitted after it.
     ///
     /// # Errors
-    /// [`Error::Light`] as for [`GpuDecoder::condition`]; [`Error::Invalid`] if there is no room for them or the batch is
+    /// [`Error::Light`] as for [`GpuDecoder::condition`]; [`Error::Invalid`] if the batch does not hold them or is
     /// another model's; [`Error::Gpu`] if the device fails.
     pub fn update(&self, queue: &Queue, into: &GpuLatents, first: u32, latents: &[Latent]) -> Result<()> {
         self.check_owner(into)?;

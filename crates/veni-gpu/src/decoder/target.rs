@@ -14,7 +14,7 @@ use crate::shader::{Directions, Grid, Request, Store, TexelFormat};
 pub struct Bake<'a> {
     pub(super) target: Target<'a>,
     pub(super) frame: Frame,
-    pub(super) turn: f64,
+    pub(super) rotation: f64,
     pub(super) stops: f32,
     pub(super) logarithm: bool,
 }
@@ -54,7 +54,7 @@ impl<'a> Bake<'a> {
     }
 
     fn new(target: Target<'a>) -> Self {
-        Self { target, frame: Frame::default(), turn: 0.0, stops: 0.0, logarithm: false }
+        Self { target, frame: Frame::default(), rotation: 0.0, stops: 0.0, logarithm: false }
     }
 
     /// The frame whose axes name cube faces and directions. Panoramas do not depend on it.
@@ -65,8 +65,8 @@ impl<'a> Bake<'a> {
 
     /// Yaw: rotates the scene about z by this angle, radians, counter-clockwise seen from above.
     #[must_use]
-    pub fn turn(self, radians: f64) -> Self {
-        Self { turn: radians, ..self }
+    pub fn rotate(self, radians: f64) -> Self {
+        Self { rotation: radians, ..self }
     }
 
     /// Radiance times 2^stops.
@@ -83,9 +83,11 @@ impl<'a> Bake<'a> {
 
     /// The kernel's ends and the request, once the target is known to fit `latents` latents.
     pub(super) fn request(&self, latents: u32) -> Result<(Directions, Store, Request)> {
-        if !self.turn.is_finite() || !self.stops.is_finite() {
-            let (turn, stops) = (self.turn, self.stops);
-            return Err(Error::invalid(format!("a turn of {turn} and {stops} stops: both must be finite")));
+        if !self.rotation.is_finite() || !self.stops.is_finite() {
+            let (rotation, stops) = (self.rotation, self.stops);
+            return Err(Error::invalid(format!(
+                "a rotation by {rotation} and {stops} stops: both must be finite"
+            )));
         }
         let (directions, store, grid, first, count) = match self.target {
             Target::Texture { texture, cube } => {
@@ -119,7 +121,7 @@ impl<'a> Bake<'a> {
         let request = Request {
             grid,
             frame: self.frame,
-            turn: self.turn,
+            rotation: self.rotation,
             log_exposure: self.stops * std::f32::consts::LN_2,
             largest,
             logarithm: self.logarithm,

@@ -8,7 +8,7 @@ use crate::decoder::{Bake, GpuDecoder, GpuLatents};
 use crate::error::{Error, Result};
 use crate::scope::guarded;
 
-/// Room on the device for the harmonics of one or more latents, and for the work of finding them. Make it once, for every frame.
+/// Workspace on the device: the harmonics of one or more latents, and what finding them takes. Make it once, for every frame.
 #[derive(Clone, Debug)]
 pub struct GpuHarmonics {
     count: u32,
@@ -19,7 +19,7 @@ pub struct GpuHarmonics {
 }
 
 impl GpuHarmonics {
-    /// For so many latents.
+    /// The number of latents it is for.
     pub fn len(&self) -> u32 {
         self.count
     }
@@ -64,7 +64,7 @@ impl GpuPrefilter {
             let descriptor = BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
             guarded(&self.device, label, || self.device.create_buffer(&descriptor))
         };
-        let [waves, coefficients] = self.tables.room;
+        let [waves, coefficients] = self.tables.sizes;
         let usage = BufferUsages::STORAGE;
         Ok(GpuHarmonics {
             count,
@@ -79,7 +79,7 @@ impl GpuPrefilter {
     /// submitted.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if there is no room for the latents, the room is of another degree, or the latents are another model's;
+    /// [`Error::Invalid`] if the workspace is of fewer latents or another degree, or the latents are another model's;
     /// [`Error::Gpu`] if the device fails to make a resource. Nothing is recorded then.
     pub fn analyse(
         &self,
@@ -115,7 +115,7 @@ impl GpuPrefilter {
         }
         if latents.len() > harmonics.count {
             return Err(Error::invalid(format!(
-                "{} latents where there is room for the harmonics of {}",
+                "{} latents where the workspace holds the harmonics of {}",
                 latents.len(),
                 harmonics.count
             )));

@@ -15,14 +15,14 @@ pub struct PrefilteredCube<'a> {
     pub(super) texture: &'a Texture,
     law: Law,
     pub(super) frame: Frame,
-    pub(super) turn: f64,
+    pub(super) rotation: f64,
 }
 
 impl<'a> PrefilteredCube<'a> {
     /// All mip levels of a storage texture: `rgba32float` or `rgba16float`, 2D, square, six layers per latent (+X −X +Y −Y +Z −Z of
     /// the frame), usage `STORAGE_BINDING`. `law` says which roughness a level has.
     pub fn new(texture: &'a Texture, law: Law) -> Self {
-        Self { texture, law, frame: Frame::default(), turn: 0.0 }
+        Self { texture, law, frame: Frame::default(), rotation: 0.0 }
     }
 
     /// The frame whose axes name the faces.
@@ -34,23 +34,23 @@ impl<'a> PrefilteredCube<'a> {
     /// Yaw: rotates the scene about z by this angle, radians, counter-clockwise seen from above. The harmonics need not be found
     /// again.
     #[must_use]
-    pub fn turn(self, radians: f64) -> Self {
-        Self { turn: radians, ..self }
+    pub fn rotate(self, radians: f64) -> Self {
+        Self { rotation: radians, ..self }
     }
 
     /// The first level, which is the field itself.
     pub(super) fn first(&self) -> Bake<'a> {
-        Bake::cube(self.texture).frame(self.frame).turn(self.turn)
+        Bake::cube(self.texture).frame(self.frame).rotate(self.rotation)
     }
 
     /// Its chain of levels and its texels, once the texture is known to fit.
     pub(super) fn levels(&self, latents: u32) -> Result<(Levels, TexelFormat)> {
         let (grid, format) = texture_grid(self.texture, true, latents)?;
-        if !self.turn.is_finite() {
-            return Err(Error::invalid(format!("a turn of {}: it must be finite", self.turn)));
+        if !self.rotation.is_finite() {
+            return Err(Error::invalid(format!("a rotation by {}: it must be finite", self.rotation)));
         }
         let count = self.texture.mip_level_count() as usize;
-        let Grid::Cube { size } = grid else { return Err(Error::invalid("a texture that is no cube")) };
+        let Grid::Cube { size } = grid else { return Err(Error::invalid("the texture is not a cube")) };
         Ok((Levels::new(size as usize, count, self.law), format))
     }
 }

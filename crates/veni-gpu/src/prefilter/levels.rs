@@ -113,7 +113,7 @@ impl GpuPrefilter {
             let level = Level {
                 size,
                 frame: cube.frame,
-                turn: cube.turn,
+                rotation: cube.rotation,
                 degree: self.degree() as u32,
                 kept: *kept,
                 gains: *first,

@@ -59,7 +59,7 @@ struct Tables {
     /// Workgroups of both passes.
     groups: [u32; 2],
     /// vec4f of waves and coefficients of a latent.
-    room: [u64; 2],
+    sizes: [u64; 2],
     uniform: Buffer,
     directions: Buffer,
     phases: Buffer,
@@ -122,7 +122,7 @@ impl Tables {
             degree: tables.degree,
             count: tables.directions.len() as u32,
             groups,
-            room: [tables.waves(), tables.coefficients()].map(|n| n as u64),
+            sizes: [tables.waves(), tables.coefficients()].map(|n| n as u64),
             uniform: filled(device, "veni rings", BufferUsages::UNIFORM, &tables.to_bytes())?,
             directions: buffer("veni ring directions", bytemuck::cast_slice(&tables.directions))?,
             phases: buffer("veni ring phases", bytemuck::cast_slice(&tables.phases))?,

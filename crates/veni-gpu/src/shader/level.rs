@@ -13,7 +13,7 @@ pub struct Level {
     /// Whose axes name the faces.
     pub frame: Frame,
     /// Rotates the scene about z by this angle, radians, counter-clockwise seen from above.
-    pub turn: f64,
+    pub rotation: f64,
     /// Largest degree of the coefficients.
     pub degree: u32,
     /// Largest degree that the level's lobe keeps.
@@ -46,7 +46,7 @@ impl Level {
     /// The uniform, little endian as WGSL lays it out.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
         let [x, y, z] =
-            axes(Grid::Cube { size: self.size }, self.frame, self.turn).map(|v| v.map(f32::to_bits));
+            axes(Grid::Cube { size: self.size }, self.frame, self.rotation).map(|v| v.map(f32::to_bits));
         let row = |[a, b, c]: [u32; 3], d: u32| [a, b, c, d];
         let words = [
             row(x, self.size),

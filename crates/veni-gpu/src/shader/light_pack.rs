@@ -32,9 +32,10 @@ pub struct PackedLight {
     pub texels: Vec<[f32; 4]>,
 }
 
-/// Packs a light once; [`LightUniform::turn_bytes`] turns it. The sun, if there is one, is drawn as its disc; all else, other
-/// compact lights as discs on pixels, is the map, of at most 2²³ pixels (larger ones are averaged). For a map that is not to be
-/// split, take it with [`LightOptions::lights`](veni_light::light::LightOptions::lights) = 0. A black light is drawn evenly.
+/// Packs a light once; [`LightUniform::rotation_bytes`] rotates it. The sun, if there is one, is drawn as its disc; all
+/// else, other compact lights as discs on pixels, is the map, of at most 2²³ pixels (larger ones are averaged). For a
+/// map that is not to be split, take it with [`LightOptions::lights`](veni_light::light::LightOptions::lights) = 0. A
+/// black light is drawn evenly.
 ///
 /// # Errors
 /// [`Error`] of kind `Invalid` if radiance is so large or small that a density or an irradiance leaves the range of f32.
@@ -54,7 +55,7 @@ pub fn pack_light(light: &Light, density: LightDensity) -> Result<PackedLight> {
     let lights: Vec<_> = first.iter().chain(rest).take(MAX_LIGHTS).map(disc).collect();
     let half = 0.5 * PI / grid.height as f64;
     let uniform = LightUniform {
-        turn: [0.0, 1.0],
+        rotation: [0.0, 1.0],
         size: [grid.width as u32, grid.height as u32],
         across: split.as_ref().map_or([[0.0; 3]; 2], SplitSampler::across),
         share: split.as_ref().map_or(0.0, SplitSampler::share),

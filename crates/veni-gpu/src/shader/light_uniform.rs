@@ -3,11 +3,11 @@
 /// Most compact lights of a light: [`LightOptions::MOST`](veni_light::light::LightOptions::MOST).
 pub const MAX_LIGHTS: usize = 8;
 
-/// A light's few numbers. Directions are native and as they are before the turn.
+/// A light's few numbers. Directions are native and as they are before the rotation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightUniform {
-    /// Sine and cosine of the turn about z, counter-clockwise seen from above.
-    pub turn: [f32; 2],
+    /// Sine and cosine of the rotation about z, counter-clockwise seen from above.
+    pub rotation: [f32; 2],
     /// W and H of the map.
     pub size: [u32; 2],
     /// Two unit vectors across the sun's direction and each other.
@@ -45,9 +45,9 @@ impl LightUniform {
     /// Bytes of the uniform.
     pub const BYTES: usize = 464;
 
-    /// The first eight bytes of the uniform for a turn by so many radians about z, counter-clockwise seen from above: all that is
-    /// written to turn a light.
-    pub fn turn_bytes(radians: f64) -> [u8; 8] {
+    /// The first eight bytes of the uniform for a rotation by `radians` about z, counter-clockwise seen from above: all
+    /// that is written to rotate a light.
+    pub fn rotation_bytes(radians: f64) -> [u8; 8] {
         let (sin, cos) = radians.sin_cos();
         bytes([(sin as f32).to_bits(), (cos as f32).to_bits()])
     }
@@ -55,7 +55,7 @@ impl LightUniform {
     /// The uniform, little endian as WGSL lays it out.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
         let row = |[x, y, z]: [f32; 3], w: u32| [x.to_bits(), y.to_bits(), z.to_bits(), w];
-        let [sin, cos] = self.turn.map(f32::to_bits);
+        let [sin, cos] = self.rotation.map(f32::to_bits);
         let [width, height] = self.size;
         let mut rows = [[0; 4]; Self::BYTES / 16];
         rows[0] = [sin, cos, width, height];
@@ -79,7 +79,7 @@ impl LightUniform {
             let [r, g, b] = light.irradiance;
             [x, y, z, light.radius, r, g, b, light.per_solid_angle]
         });
-        let own = [self.share, self.cap, self.pole].into_iter().chain(self.turn);
+        let own = [self.share, self.cap, self.pole].into_iter().chain(self.rotation);
         own.chain(self.across.as_flattened().iter().copied())
             .chain(discs)
             .chain(self.diffuse.as_flattened().iter().copied())

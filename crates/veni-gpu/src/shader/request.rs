@@ -53,7 +53,7 @@ pub struct Request {
     /// Coordinates of the directions: of cube faces and lists.
     pub frame: Frame,
     /// Yaw: rotates the scene about z by this angle, radians, counter-clockwise seen from above.
-    pub turn: f64,
+    pub rotation: f64,
     /// Added to log radiance.
     pub log_exposure: f32,
     /// Largest number that is stored; values beyond it are clamped to it, of either sign.
@@ -81,7 +81,7 @@ impl Request {
             Grid::Cube { size } => (1, size, size),
             Grid::List { .. } => (0, 1, 1),
         };
-        let [x, y, z] = axes(self.grid, self.frame, self.turn);
+        let [x, y, z] = axes(self.grid, self.frame, self.rotation);
         let f = |v: [f32; 3]| v.map(f32::to_bits);
         let ([a, b, c], [d, e, g], [h, i, j]) = (f(x), f(y), f(z));
         let words = [
@@ -98,10 +98,10 @@ impl Request {
     }
 }
 
-/// What the coordinate axes of directions are in the native frame of the unturned scene.
-pub(super) fn axes(grid: Grid, frame: Frame, turn: f64) -> [[f32; 3]; 3] {
+/// What the coordinate axes of directions are in the native frame of the unrotated scene.
+pub(super) fn axes(grid: Grid, frame: Frame, rotation: f64) -> [[f32; 3]; 3] {
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let (sin, cos) = turn.sin_cos();
+    let (sin, cos) = rotation.sin_cos();
     let (sin, cos) = (sin as f32, cos as f32);
     axes.map(|axis| {
         let axis = match grid {
@@ -110,7 +110,7 @@ pub(super) fn axes(grid: Grid, frame: Frame, turn: f64) -> [[f32; 3]; 3] {
             Grid::Cube { .. } if frame == Frame::Bevy => frame.to_native([axis[0], axis[1], -axis[2]]),
             _ => frame.to_native(axis),
         };
-        // turning the scene by α looks up at −α
+        // rotating the scene by α looks up at −α
         let [x, y, z] = axis;
         [cos * x + sin * y, cos * y - sin * x, z]
     })

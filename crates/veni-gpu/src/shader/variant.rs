@@ -329,7 +329,7 @@ mod tests {
                 let request = Request {
                     grid: Grid::Equirect { width, height },
                     frame: Frame::default(),
-                    turn: 0.0,
+                    rotation: 0.0,
                     log_exposure: 0.0,
                     largest: f32::MAX,
                     logarithm: false,

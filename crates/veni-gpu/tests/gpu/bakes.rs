@@ -20,7 +20,7 @@ fn a_batch_fills_a_layer_per_latent_in_one_pass() {
     let Some(gpu) = util::plain() else { return };
     let model = filler(4, 24, 2);
     let decoder = GpuDecoder::new(&gpu.opened.device, &model).unwrap();
-    let frames: Vec<_> = (0..3).map(|i| latent(4, 1).turned(f64::from(i))).collect();
+    let frames: Vec<_> = (0..3).map(|i| latent(4, 1).rotated(f64::from(i))).collect();
     let latents = decoder.condition_batch(&gpu.opened.queue, &frames).unwrap();
     let texture = gpu.texture(TextureFormat::Rgba32Float, [20, 10, 3]);
     gpu.bake(&decoder, &latents, &Bake::equirect(&texture).logarithm());

@@ -110,8 +110,8 @@ fn cube_faces_and_lists_in_every_frame() {
     let model = filler(9, 128, 6);
     let decoder = GpuDecoder::new(&gpu.opened.device, &model).unwrap();
     let latent = latent(9, 2);
-    let turn = 0.7;
-    let field = model.decoder().unwrap().condition(&latent).unwrap().turned(turn).brightened(0.5);
+    let angle = 0.7;
+    let field = model.decoder().unwrap().condition(&latent).unwrap().rotated(angle).brightened(0.5);
     let latents = decoder.condition(&gpu.opened.queue, &latent).unwrap();
     let size = 4;
     for frame in Frame::ALL {
@@ -120,8 +120,11 @@ fn cube_faces_and_lists_in_every_frame() {
         field.log_radiance_batch(&native, &mut expected);
         let pixels = gpu.pixels(native.len());
         let grid = Grid::Cube { size: size as u32 };
-        let bake =
-            Bake::rows(&pixels, grid, 0..6 * size as u32).frame(frame).turn(turn).brighten(0.5).logarithm();
+        let bake = Bake::rows(&pixels, grid, 0..6 * size as u32)
+            .frame(frame)
+            .rotate(angle)
+            .brighten(0.5)
+            .logarithm();
         gpu.bake(&decoder, &latents, &bake);
         let off = difference(&gpu.read(&pixels), &expected);
         assert!(agrees(off), "cube in {frame:?}: {off:?}");
@@ -132,7 +135,7 @@ fn cube_faces_and_lists_in_every_frame() {
         let mut expected = vec![[0.0; 3]; list.len()];
         field.log_radiance_batch(&native, &mut expected);
         let (from, to) = (gpu.upload(&list), gpu.pixels(list.len()));
-        let bake = Bake::directions(&from, &to, 100).frame(frame).turn(turn).brighten(0.5).logarithm();
+        let bake = Bake::directions(&from, &to, 100).frame(frame).rotate(angle).brighten(0.5).logarithm();
         gpu.bake(&decoder, &latents, &bake);
         let off = difference(&gpu.read(&to), &expected);
         assert!(agrees(off), "list in {frame:?}: {off:?}");

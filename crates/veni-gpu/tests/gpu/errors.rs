@@ -40,7 +40,7 @@ fn what_does_not_fit_is_named() {
     refused(&decoder, &Bake::rows(&small, grid, 4..5), &["rows"]);
     let unstored = gpu.buffer(1024, BufferUsages::COPY_DST);
     refused(&decoder, &Bake::directions(&unstored, &small, 2), &["direction buffer", "STORAGE"]);
-    refused(&decoder, &Bake::rows(&small, grid, 0..1).turn(f64::NAN), &["NaN"]);
+    refused(&decoder, &Bake::rows(&small, grid, 0..1).rotate(f64::NAN), &["NaN"]);
     refused(&decoder, &Bake::directions(&small, &small, 8), &["same buffer"]);
     let other = GpuDecoder::new(device, &filler(4, 16, 1)).unwrap();
     refused(&other, &Bake::rows(&small, grid, 0..1), &["model"]);

@@ -32,7 +32,7 @@ impl Work {
         let request = Request {
             grid: Grid::List { count },
             frame: Frame::Gltf,
-            turn: 0.4,
+            rotation: 0.4,
             log_exposure: 0.25,
             largest: f32::MAX,
             logarithm: true,
@@ -53,9 +53,9 @@ impl Work {
         self.directions.iter().map(value).collect()
     }
 
-    /// Runs `source` with the variant's bindings and dispatches; the target has `room` vec4f.
-    pub(crate) fn run(&self, gpu: &Gpu, variant: &Variant, source: &str, room: usize) -> Vec<[f32; 4]> {
-        self.run_by(&variant.dispatches(self.request, 1), gpu, variant, source, room)
+    /// Runs `source` with the variant's bindings and dispatches; the target has `size` vec4f.
+    pub(crate) fn run(&self, gpu: &Gpu, variant: &Variant, source: &str, size: usize) -> Vec<[f32; 4]> {
+        self.run_by(&variant.dispatches(self.request, 1), gpu, variant, source, size)
     }
 
     /// The same with dispatches of one's choice.
@@ -65,7 +65,7 @@ impl Work {
         gpu: &Gpu,
         variant: &Variant,
         source: &str,
-        room: usize,
+        size: usize,
     ) -> Vec<[f32; 4]> {
         let device = &gpu.opened.device;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -91,7 +91,7 @@ impl Work {
         let twin = &self.twin;
         let mut buffers = vec![filled(&twin.matrices), filled(&twin.vectors), filled(&twin.latents)];
         let uniform = gpu.buffer(Request::BYTES as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
-        buffers.extend([uniform.clone(), gpu.pixels(room), gpu.upload(&self.directions)]);
+        buffers.extend([uniform.clone(), gpu.pixels(size), gpu.upload(&self.directions)]);
         assert_eq!(variant.bindings()[3], Binding::Uniform);
         let entries: Vec<_> = (0..)
             .zip(&buffers)

@@ -129,7 +129,7 @@ fn levels_are_those_of_the_cpu_in_every_frame() {
     let model = pretrained();
     let decoder = GpuDecoder::new(device, &model).unwrap();
     let prefilter = GpuPrefilter::new(device).unwrap();
-    let turn = 0.7;
+    let angle = 0.7;
     for (frame, format, size, count, seed) in [
         (Frame::Blender, TextureFormat::Rgba32Float, 64, 5, 19),
         (Frame::Blender, TextureFormat::Rgba32Float, 64, 5, 7),
@@ -138,13 +138,13 @@ fn levels_are_those_of_the_cpu_in_every_frame() {
         (Frame::Bevy, TextureFormat::Rgba32Float, 16, 3, 19),
     ] {
         let latent = sky(&model, seed);
-        let pixels = model.decoder().unwrap().condition(&latent.turned(turn)).unwrap().bake(FINE);
+        let pixels = model.decoder().unwrap().condition(&latent.rotated(angle)).unwrap().bake(FINE);
         let latents = decoder.condition(queue, &latent).unwrap();
         let harmonics = gpu.analyse(&prefilter, &decoder, &[latent]);
         let levels = Levels::new(size, count, Law::Quadratic);
         let cpu = Prefilter::new(EnvironmentMap::new(FINE, &pixels).unwrap(), &[levels]);
         let chain = gpu.chain(format, size as u32, count as u32, 1);
-        let cube = PrefilteredCube::new(&chain, Law::Quadratic).frame(frame).turn(turn);
+        let cube = PrefilteredCube::new(&chain, Law::Quadratic).frame(frame).rotate(angle);
         let mut encoder = device.create_command_encoder(&Default::default());
         prefilter.bake(&mut encoder, &decoder, &latents, &harmonics, &cube).unwrap();
         queue.submit([encoder.finish()]);
@@ -170,7 +170,7 @@ fn levels_are_those_of_the_cpu_in_every_frame() {
         // the first level is the field
         let first = gpu.level(&chain, 0);
         let direct = gpu.texture(format, [size as u32, size as u32, 6]);
-        gpu.bake(&decoder, &latents, &Bake::cube(&direct).frame(frame).turn(turn));
+        gpu.bake(&decoder, &latents, &Bake::cube(&direct).frame(frame).rotate(angle));
         assert_eq!(first, gpu.read_texture(&direct));
     }
 }
@@ -320,23 +320,23 @@ fn what_does_not_fit_is_named() {
     let [small, other] = [4, 8].map(|degree| GpuPrefilter::with_degree(device, degree).unwrap());
     said(small.harmonics(0).unwrap_err(), &["0 latents"]);
     said(small.harmonics(1 << 20).unwrap_err(), &["max_storage_buffer_binding_size"]);
-    let room = small.harmonics(1).unwrap();
+    let workspace = small.harmonics(1).unwrap();
     let two = decoder.condition_batch(queue, &[latent(3, 1), latent(3, 2)]).unwrap();
     let one = decoder.condition(queue, &latent(3, 1)).unwrap();
     let mut encoder = device.create_command_encoder(&Default::default());
-    said(small.analyse(&mut encoder, &decoder, &two, &room).unwrap_err(), &["2 latents", "room"]);
-    said(other.analyse(&mut encoder, &decoder, &one, &room).unwrap_err(), &["degree 4", "8"]);
+    said(small.analyse(&mut encoder, &decoder, &two, &workspace).unwrap_err(), &["2 latents", "workspace"]);
+    said(other.analyse(&mut encoder, &decoder, &one, &workspace).unwrap_err(), &["degree 4", "8"]);
     let foreign = GpuDecoder::new(device, &filler(3, 8, 1)).unwrap();
-    said(small.analyse(&mut encoder, &foreign, &one, &room).unwrap_err(), &["model"]);
+    said(small.analyse(&mut encoder, &foreign, &one, &workspace).unwrap_err(), &["model"]);
     let flat = gpu.texture(TextureFormat::Rgba32Float, [8, 8, 1]);
     let bake = |encoder: &mut wgpu::CommandEncoder, cube: &PrefilteredCube<'_>| {
-        small.bake(encoder, &decoder, &one, &room, cube).unwrap_err()
+        small.bake(encoder, &decoder, &one, &workspace, cube).unwrap_err()
     };
     said(bake(&mut encoder, &PrefilteredCube::new(&flat, Law::Linear)), &["1 layers"]);
     let chain = gpu.chain(TextureFormat::Rgba32Float, 8, 2, 1);
-    said(bake(&mut encoder, &PrefilteredCube::new(&chain, Law::Linear).turn(f64::NAN)), &["NaN"]);
+    said(bake(&mut encoder, &PrefilteredCube::new(&chain, Law::Linear).rotate(f64::NAN)), &["NaN"]);
     // and what fits is still recorded
-    small.analyse(&mut encoder, &decoder, &one, &room).unwrap();
-    small.bake(&mut encoder, &decoder, &one, &room, &PrefilteredCube::new(&chain, Law::Linear)).unwrap();
+    small.analyse(&mut encoder, &decoder, &one, &workspace).unwrap();
+    small.bake(&mut encoder, &decoder, &one, &workspace, &PrefilteredCube::new(&chain, Law::Linear)).unwrap();
     queue.submit([encoder.finish()]);
 }

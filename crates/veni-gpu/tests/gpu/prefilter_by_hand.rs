@@ -46,14 +46,14 @@ impl Work {
         let level = Level {
             size: SIZE,
             frame: Frame::Gltf,
-            turn: 0.4,
+            rotation: 0.4,
             degree: DEGREE as u32,
             kept: gains.len() as u32 - 1,
             gains: 3,
             samples,
             largest: f32::MAX,
         };
-        let (sin, cos) = (-level.turn).sin_cos();
+        let (sin, cos) = (-level.rotation).sin_cos();
         let n = SIZE * samples;
         let mut texels = Vec::new();
         for own in coefficients.chunks_exact(tables.coefficients()) {

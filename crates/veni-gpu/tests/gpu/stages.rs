@@ -144,7 +144,7 @@ fn feature_error(index: usize, change: impl Fn(String) -> String) -> Option<[f64
     large.vectors[1] = [4000.0, -7000.0, 0.0];
     let mut work = Work::new(&filler(5, 8, 1), &[large], directions(200));
     // directions as they are: to round one in its last bit would shift the phase by itself
-    (work.request.frame, work.request.turn) = (Frame::Blender, 0.0);
+    (work.request.frame, work.request.rotation) = (Frame::Blender, 0.0);
     let call = format!("veni_encode(veni_latent(0u), {index}u, direction)");
     let phases = format!("vec4f({call}.sin_once, {call}.sin_fourfold, {call}.cos_once, {call}.cos_fourfold)");
     let phases = each_changed(&work, false, &phases, &change)?;

@@ -27,7 +27,7 @@ pub fn refuse_existing(folder: &Path, overwrite: Overwrite) -> Result<()> {
             let full = entries.next().is_some();
             if full && overwrite == Overwrite::Refuse { Err(Error::exists(folder)) } else { Ok(()) }
         }
-        Err(_) if folder.symlink_metadata().is_ok() => Err(Error::invalid("is no folder").in_file(folder)),
+        Err(_) if folder.symlink_metadata().is_ok() => Err(Error::invalid("is not a folder").in_file(folder)),
         Err(_) => Ok(()),
     }
 }
@@ -57,7 +57,7 @@ impl Folder {
         self.add_values(name, image, true)
     }
 
-    /// The same of values that are no colours.
+    /// The same of values that are not colours.
     pub(super) fn add_numbers(&mut self, name: &str, image: &Panorama) -> Result<()> {
         self.add_values(name, image, false)
     }
@@ -65,7 +65,7 @@ impl Folder {
     fn add_values(&mut self, name: &str, image: &Panorama, colour: bool) -> Result<()> {
         let keeps = half_error(image.pixels(), 1.0) <= HALF_ERROR;
         let precision = if keeps { Precision::Half } else { Precision::Float };
-        // what little it loses at the dark end is no reason to refuse
+        // what little it loses at the dark end is not a reason to refuse
         let half_range = HalfRange::Factor(1.0);
         let options = WriteOptions { half_range, colour, ..WriteOptions::new(WriteFormat::Exr(precision)) };
         image.write(self.staged.join(name), &options)?;

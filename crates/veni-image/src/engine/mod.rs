@@ -158,7 +158,8 @@ pub struct Sampling {
     pub buffers: Vec<(&'static str, Vec<u8>)>,
 }
 
-/// Writes the folder for an engine, with everything in it or not at all, and gives the files. `observer` is told of every image.
+/// Writes the folder for an engine, with everything in it or not at all, and gives the files. Every image is reported
+/// to `observer`.
 ///
 /// # Errors
 /// [`Error::Exists`](crate::Error::Exists) if the folder holds anything and may not be replaced; an

@@ -6,7 +6,7 @@ use super::*;
 use crate::provenance::Provenance;
 use veni_light::output::Overwrite;
 
-/// As long as a latent of 300 numbers.
+/// As long as a latent of dimension 300.
 fn long() -> String {
     (0..400).map(|k| format!("[{k},{}]", k * k)).collect()
 }

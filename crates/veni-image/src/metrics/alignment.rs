@@ -44,7 +44,7 @@ pub fn log_factor(prediction: &[f32], target: &[f32]) -> f64 {
 /// average of I − P over the sphere (rows weighted by solid angle).
 ///
 /// # Panics
-/// If the lengths differ or are no multiple of `height`.
+/// If the lengths differ or are not a multiple of `height`.
 pub fn exposure_offset(prediction: &[f32], target: &[f32], height: usize) -> f64 {
     assert_eq!(prediction.len(), target.len(), "two images of different size");
     assert!(

@@ -13,7 +13,7 @@ pub fn log_error(a: &[f32], b: &[f32]) -> f64 {
 /// The same with each row of `[height, width, 3]` weighted by the sine of its polar angle, that is by solid angle.
 ///
 /// # Panics
-/// If the lengths differ or are no multiple of `height`.
+/// If the lengths differ or are not a multiple of `height`.
 pub fn weighted_log_error(a: &[f32], b: &[f32], height: usize) -> f64 {
     assert!(height > 0 && a.len().is_multiple_of(height), "{} values in {height} rows", a.len());
     let row = a.len() / height;

@@ -27,7 +27,7 @@ impl Content {
             let mut file = open(path)?;
             let kind = kind(&mut file, path)?;
             if !matches!(kind, Kind::Display(_)) {
-                precheck::room(declared(&mut file, path)?, options)?;
+                precheck::budget(declared(&mut file, path)?, options)?;
             }
             Ok(match kind {
                 Kind::Exr => Self::Radiance(exr::read(file, path, options)?),
@@ -93,7 +93,7 @@ pub(super) fn radiance(path: &Path, options: &ReadOptions) -> Result<Panorama> {
     let mut file = open(path)?;
     let kind = kind(&mut file, path)?;
     if !matches!(kind, Kind::Display(_)) {
-        precheck::room(declared(&mut file, path)?, options)?;
+        precheck::budget(declared(&mut file, path)?, options)?;
     }
     match kind {
         Kind::Exr => exr::read(file, path, options),

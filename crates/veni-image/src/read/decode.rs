@@ -91,7 +91,7 @@ pub(super) fn decode(path: &Path, options: &ReadOptions) -> Result<Decoded> {
         ImageError::Unsupported(e) => Error::unsupported(format!("{name}: {e}")),
         other => Error::invalid(format!("damaged or truncated {name} file: {other}")),
     };
-    precheck::room(precheck::ldr(&mut file, path, format)?, options)?;
+    precheck::budget(precheck::ldr(&mut file, path, format)?, options)?;
     match format {
         ImageFormat::Jpeg => {
             let mut bytes = Vec::new();
@@ -166,7 +166,7 @@ fn pixels(
         meaning = display::meaning(&tags)?;
         if let Some(bytes) = jpeg {
             match gain_map::find(bytes, stored)? {
-                Found::Map(map) => gain_map = Some(map.turned(orientation)),
+                Found::Map(map) => gain_map = Some(map.oriented(orientation)),
                 Found::Note(note) => meaning.note(note),
                 Found::None => {}
             }

@@ -123,7 +123,7 @@ impl GainMap {
     }
 
     /// Turned like the picture it belongs to.
-    pub(super) fn turned(mut self, orientation: Orientation) -> Self {
+    pub(super) fn oriented(mut self, orientation: Orientation) -> Self {
         self.image.apply_orientation(orientation);
         self
     }

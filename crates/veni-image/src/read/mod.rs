@@ -49,7 +49,7 @@ pub struct ReadOptions {
     pub any_aspect: bool,
     /// Which EXR layer to read, for files with several ("ViewLayer.Combined" for channels "ViewLayer.Combined.R" …).
     pub layer: Option<String>,
-    /// The numbers are no colours (normals, masks): they are given as stored, whatever the file says of colours.
+    /// The values are not colours (normals, masks): they are given as stored, whatever the file says of colours.
     pub data: bool,
     /// A picture that its file calls a part of a panorama (GPano) is placed in its full sphere, the rest unknown; otherwise it
     /// is given as it is.

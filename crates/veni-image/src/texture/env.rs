@@ -91,10 +91,10 @@ impl EnvHeader {
     /// The header at the beginning of a file.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if it is no such file, or its JSON is damaged or does not end.
+    /// [`Error::Invalid`] if it is not such a file, or its JSON is damaged or does not end.
     pub fn read(start: &[u8]) -> Result<Self> {
         let Some(rest) = start.strip_prefix(&MAGIC) else {
-            return Err(Error::invalid("is no Babylon.js environment"));
+            return Err(Error::invalid("is not a Babylon.js environment"));
         };
         let Some(end) = rest.iter().take(LONGEST).position(|b| *b == 0) else {
             return Err(Error::invalid(format!(

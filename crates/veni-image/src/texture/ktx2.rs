@@ -148,10 +148,10 @@ impl Ktx2Header {
     /// The header at the beginning of a file.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if it is no KTX2 file, cut short, or has no texels.
+    /// [`Error::Invalid`] if it is not a KTX2 file, cut short, or has no texels.
     pub fn read(start: &[u8]) -> Result<Self> {
         if !Self::recognises(start) {
-            return Err(Error::invalid("is no KTX2 file"));
+            return Err(Error::invalid("is not a KTX2 file"));
         }
         let Some(words) = start.get(12..48) else {
             return Err(Error::invalid(format!("a KTX2 file of {} bytes has no whole header", start.len())));

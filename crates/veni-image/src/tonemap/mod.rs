@@ -5,7 +5,7 @@
 
 pub mod srgb;
 
-pub use srgb::{srgb, srgb_of_log, srgb_slope, srgb_to_linear};
+pub use srgb::{srgb, srgb_derivative, srgb_of_log, srgb_to_linear};
 
 use super::Panorama;
 

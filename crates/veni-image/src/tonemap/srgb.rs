@@ -21,7 +21,7 @@ pub fn srgb(v: f32) -> f32 {
 }
 
 /// The derivative of [`srgb`] by v.
-pub fn srgb_slope(v: f64) -> f64 {
+pub fn srgb_derivative(v: f64) -> f64 {
     if v <= KNEE { SLOPE } else { SCALE / GAMMA * v.powf(1.0 / GAMMA - 1.0) }
 }
 
@@ -76,12 +76,12 @@ mod tests {
             let v = f64::exp(x);
             let (value, by_log) = srgb_of_log(x);
             assert!((value - f64::from(srgb(v as f32))).abs() < 1e-6, "{x}");
-            assert!((by_log - srgb_slope(v) * v).abs() < 1e-12, "{x}");
+            assert!((by_log - srgb_derivative(v) * v).abs() < 1e-12, "{x}");
             let step = 1e-5;
             let difference = (srgb_of_log(x + step).0 - srgb_of_log(x - step).0) / (2.0 * step);
             assert!((by_log - difference).abs() < 1e-7, "{x}: {by_log} {difference}");
         }
         assert_eq!(srgb_of_log(0.5), (1.0, 0.0));
-        assert_eq!(srgb_slope(0.0), 12.92);
+        assert_eq!(srgb_derivative(0.0), 12.92);
     }
 }

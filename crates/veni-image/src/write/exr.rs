@@ -140,8 +140,8 @@ fn header(grid: Equirect, precision: Precision, factor: f32, options: &WriteOpti
     let channels = ["B", "G", "R"].map(|name| ChannelDescription::new(name, sample_type, false));
     let mut attributes =
         LayerAttributes { software_name: Some(Text::from(SOFTWARE)), ..LayerAttributes::default() };
-    let room = |name: &str| if ["comments", "owner"].contains(&name) { usize::MAX } else { MAX_TEXT };
-    for (name, value) in texts(options, factor, room)? {
+    let limit = |name: &str| if ["comments", "owner"].contains(&name) { usize::MAX } else { MAX_TEXT };
+    for (name, value) in texts(options, factor, limit)? {
         let value = text(&value)?;
         match name.as_str() {
             "comments" => attributes.comments = Some(value),

@@ -28,10 +28,10 @@ pub(super) fn fit(pixels: &[[f32; 3]]) -> f32 {
     if high == 0.0 {
         return 1.0;
     }
-    let room = (most / high).log2().floor();
+    let headroom = (most / high).log2().floor();
     let wanted = (least / low).log2().ceil().max(0.0);
     // a factor that is itself a number
-    wanted.min(room).clamp(-126.0, 126.0).exp2() as f32
+    wanted.min(headroom).clamp(-126.0, 126.0).exp2() as f32
 }
 
 /// The largest [`half_error`] with which a panorama is worth keeping in half precision; ordinary ones have 2e-4.

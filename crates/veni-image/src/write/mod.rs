@@ -29,9 +29,13 @@ const SOFTWARE: &str = concat!("veni ", env!("CARGO_PKG_VERSION"));
 /// Attributes whose values are written already.
 const RESERVED: [&str; 3] = [RADIANCE_SCALE, PIXEL_DIGEST, exr::COLOUR_SPACE];
 
-/// The attributes of `options` in parts of at most `room(name)` bytes, and where there are any, or `factor` changes the
-/// values, room for the digest of the pixels.
-fn texts(options: &WriteOptions, factor: f32, room: impl Fn(&str) -> usize) -> Result<Vec<(String, String)>> {
+/// The attributes of `options` in parts of at most `limit(name)` bytes, and where there are any, or `factor` changes the
+/// values, a place for the digest of the pixels.
+fn texts(
+    options: &WriteOptions,
+    factor: f32,
+    limit: impl Fn(&str) -> usize,
+) -> Result<Vec<(String, String)>> {
     let mut all = options.attributes.clone();
     if let Some(name) = all.keys().find(|name| RESERVED.contains(&name.as_str())) {
         return Err(Error::invalid(format!(
@@ -44,7 +48,7 @@ fn texts(options: &WriteOptions, factor: f32, room: impl Fn(&str) -> usize) -> R
     if !all.is_empty() {
         all.insert(PIXEL_DIGEST.to_owned(), PixelDigest::BLANK.to_owned());
     }
-    numbered::split(&all, room)
+    numbered::split(&all, limit)
 }
 
 /// Bits of an EXR sample.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::{CompactLight, Kind};
 use crate::sphere::Equirect;
 
-/// Beyond so many standard deviations there is nothing: e^{−18}.
+/// Beyond this many standard deviations there is nothing: e^{−18}.
 const REACH: f64 = 6.0;
 /// A pixel is sampled at least this often per standard deviation and axis: at a pole, where the rule of the middle errs most, by 1/24
 /// of the square of the step.
@@ -68,7 +68,7 @@ impl Glow {
         1.0 / self.kappa.sqrt()
     }
 
-    /// So many places along each side of a pixel of this angle give its mean.
+    /// The number of places along each side of a pixel of this angle that give its mean.
     pub(super) fn places(&self, pixel: f64) -> usize {
         (PER_DEVIATION * pixel / self.deviation()).max(pixel / LARGE).ceil().max(1.0) as usize
     }
@@ -97,9 +97,9 @@ impl Glow {
         if !rows.clone().any(near) {
             return;
         }
-        let turn = |fraction: f64| std::f64::consts::PI * (1.0 - 2.0 * fraction / grid.width as f64);
+        let azimuth = |fraction: f64| std::f64::consts::PI * (1.0 - 2.0 * fraction / grid.width as f64);
         let columns: Vec<(f64, f64)> =
-            (0..grid.width * n).map(|k| turn((k as f64 + 0.5) / n as f64).sin_cos()).collect();
+            (0..grid.width * n).map(|k| azimuth((k as f64 + 0.5) / n as f64).sin_cos()).collect();
         for (row, pixels) in rows.zip(pixels.chunks_exact_mut(grid.width)) {
             if !near(row) {
                 continue;

@@ -18,7 +18,7 @@ const SAME: f32 = std::f32::consts::FRAC_PI_4;
 /// let sun = CompactLight::new([0.6, 0.0, 0.8], [9.0, 8.0, 7.0], CompactLight::SUN_RADIUS);
 /// let lights = Lights::new(Some(sun), Vec::new());
 /// assert_eq!(lights.len(), 1);
-/// assert_eq!(lights.turned(1.0).sun().unwrap().elevation(), sun.elevation());
+/// assert_eq!(lights.rotated(1.0).sun().unwrap().elevation(), sun.elevation());
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lights {
@@ -45,10 +45,10 @@ impl Lights {
         &self.all[usize::from(self.has_sun)..]
     }
 
-    /// The same lights after a turn by `angle` radians about z, counter-clockwise seen from above.
+    /// The same lights after a rotation by `angle` radians about z, counter-clockwise seen from above.
     #[must_use]
-    pub fn turned(&self, angle: f64) -> Self {
-        self.map(|light| light.turned(angle))
+    pub fn rotated(&self, angle: f64) -> Self {
+        self.map(|light| light.rotated(angle))
     }
 
     /// The lights of the mirrored scene: azimuth φ becomes −φ.
@@ -95,8 +95,9 @@ impl Lights {
         self.all.iter().map(of_light).fold(0.0, f32::max)
     }
 
-    /// What each texel of a cube map whose faces are named by `frame` ([`CubeFace::direction`](crate::sphere::CubeFace::direction)) gains from the lights: indices,
-    /// face after face, row-major and ascending for each light, and radiance.
+    /// What each texel of a cube map whose faces are named by `frame`
+    /// ([`CubeFace::direction`](crate::sphere::CubeFace::direction)) gains from the lights: indices, face after face,
+    /// row-major and ascending for each light, and radiance.
     pub fn on_cube(&self, frame: Frame, size: usize) -> Vec<(usize, [f32; 3])> {
         self.all.iter().flat_map(|light| light.on_cube(frame, size)).collect()
     }
@@ -130,7 +131,7 @@ impl Lights {
         Self::new(sun.filter(seen), others)
     }
 
-    /// Refuses what is no light.
+    /// Refuses what is not a light.
     ///
     /// # Errors
     /// [`Error`] of kind `Invalid` naming the first light whose direction is not a unit vector, whose irradiance is negative or not
@@ -254,13 +255,13 @@ mod tests {
     }
 
     #[test]
-    fn mirrored_scenes_turn_the_other_way() {
+    fn mirrored_scenes_rotate_the_other_way() {
         let a = Lights::new(Some(light(20.0, 30.0, 4.0)), [light(100.0, 0.0, 1.0)]);
         let near = |a: &Lights, b: &Lights| {
             a.iter().zip(b.iter()).all(|(a, b)| angle(a.direction, b.direction) < 1e-6)
         };
-        assert!(near(&a.turned(0.4).mirrored(), &a.mirrored().turned(-0.4)));
-        assert!(!near(&a.turned(0.4).mirrored(), &a.mirrored().turned(0.4)));
+        assert!(near(&a.rotated(0.4).mirrored(), &a.mirrored().rotated(-0.4)));
+        assert!(!near(&a.rotated(0.4).mirrored(), &a.mirrored().rotated(0.4)));
         assert_eq!(a.scaled(2.0).integral(), a.integral().map(|e| 2.0 * e));
     }
 

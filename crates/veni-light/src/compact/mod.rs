@@ -202,9 +202,9 @@ impl CompactLight {
         points.sum::<f32>() / Self::POINTS as f32
     }
 
-    /// The same light after a turn by `angle` radians about z, counter-clockwise seen from above.
+    /// The same light after a rotation by `angle` radians about z, counter-clockwise seen from above.
     #[must_use]
-    pub fn turned(mut self, angle: f64) -> Self {
+    pub fn rotated(mut self, angle: f64) -> Self {
         let ((s, c), [x, y, z]) = (angle.sin_cos(), self.direction.map(f64::from));
         self.direction = [c * x - s * y, s * x + c * y, z].map(|v| v as f32);
         self
@@ -220,13 +220,13 @@ mod tests {
     }
 
     #[test]
-    fn angles_and_turns() {
+    fn angles_and_rotations() {
         let light = light([0.6, 0.0, 0.8]);
         assert!(light.azimuth().abs() < 1e-6);
         assert!((light.elevation() - 0.8f32.asin()).abs() < 1e-6);
-        let turned = light.turned(1.0);
-        assert!((turned.azimuth() - 1.0).abs() < 1e-6);
-        assert!((turned.elevation() - light.elevation()).abs() < 1e-6);
+        let rotated = light.rotated(1.0);
+        assert!((rotated.azimuth() - 1.0).abs() < 1e-6);
+        assert!((rotated.elevation() - light.elevation()).abs() < 1e-6);
     }
 
     #[test]

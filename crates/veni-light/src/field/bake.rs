@@ -9,7 +9,7 @@ use super::single::Single;
 use crate::sphere::Equirect;
 use crate::tasks;
 
-/// So many directions are faster one by one than as a block with idle lanes.
+/// Up to this many directions are faster one by one than as a block with idle lanes.
 const FEW: usize = 6;
 /// Directions of one task: a few blocks, so that all cores finish together.
 pub(super) const TASK: usize = 192;
@@ -49,7 +49,7 @@ impl Field {
 
     fn batch(&self, directions: &[[f32; 3]], out: &mut [[f32; 3]], log: bool) {
         let (n, m) = (directions.len(), out.len());
-        assert!(n == m, "{n} directions need room for {n} radiances, not {m}");
+        assert!(n == m, "{n} directions need memory for {n} radiances, not {m}");
         if n <= TASK {
             return self.run(directions, out, log, &mut Aligned::default());
         }

@@ -55,7 +55,7 @@ impl Evaluator {
     /// If `out` is not as long as `directions`.
     pub fn radiance_batch(&mut self, directions: &[[f32; 3]], out: &mut [[f32; 3]]) {
         let (n, m) = (directions.len(), out.len());
-        assert!(n == m, "{n} directions need room for {n} radiances, not {m}");
+        assert!(n == m, "{n} directions need memory for {n} radiances, not {m}");
         for (directions, out) in directions.chunks(bake::TASK).zip(out.chunks_mut(bake::TASK)) {
             self.field.run(directions, out, false, &mut self.scratch);
         }

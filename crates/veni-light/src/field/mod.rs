@@ -182,19 +182,19 @@ impl Field {
         FoldedLatent { vectors, input_bias, shifts: shift, lobes, log_exposure: *log_exposure }
     }
 
-    /// The same scene turned by `radians` about z, counter-clockwise seen from above. Exact: it turns the latent,
+    /// The same scene rotated by `radians` about z, counter-clockwise seen from above. Exact: it rotates the latent,
     /// not the picture.
     #[must_use]
-    pub fn turned(&self, radians: f64) -> Self {
+    pub fn rotated(&self, radians: f64) -> Self {
         let (sin, cos) = radians.sin_cos();
-        let turn = |[x, y]: &[f32; 2]| {
+        let rotate = |[x, y]: &[f32; 2]| {
             let (x, y) = (f64::from(*x), f64::from(*y));
             [(x * cos - y * sin) as f32, (x * sin + y * cos) as f32]
         };
         let mut folded = Folded::clone(&self.folded);
-        folded.vectors = folded.vectors.iter().map(turn).collect();
-        folded.lobes = folded.lobes.iter().map(|lobe| lobe.turned(radians)).collect();
-        folded.set_lights(folded.lights.turned(radians));
+        folded.vectors = folded.vectors.iter().map(rotate).collect();
+        folded.lobes = folded.lobes.iter().map(|lobe| lobe.rotated(radians)).collect();
+        folded.set_lights(folded.lights.rotated(radians));
         Self { weights: Arc::clone(&self.weights), folded: Arc::new(folded) }
     }
 

@@ -31,7 +31,7 @@ mod tests {
     fn codes() -> Vec<Latent> {
         let one = |seed| {
             let mut latent = Latent::from_seed(&Prior::standard(4), seed);
-            // vectors that turn together, and z away from 0
+            // vectors that rotate together, and z away from 0
             let first = latent.vectors[0];
             latent.vectors[1] =
                 [0.5 * first[0] - 0.8 * first[1], 0.5 * first[1] + 0.8 * first[0], 2.0 + first[2]];
@@ -51,12 +51,12 @@ mod tests {
     }
 
     #[test]
-    fn gradients_agree_with_differences_and_turning_changes_nothing() {
+    fn gradients_agree_with_differences_and_rotations_change_nothing() {
         let prior = Prior::fit(&codes(), None).unwrap();
         let latent = Latent::from_seed(&Prior::standard(4), 9);
         let (energy, gradient) = prior.energy(&latent.vectors);
-        let (turned, _) = prior.energy(&latent.turned(1.1).vectors);
-        assert!((energy - turned).abs() < 1e-4 * energy);
+        let (rotated, _) = prior.energy(&latent.rotated(1.1).vectors);
+        assert!((energy - rotated).abs() < 1e-4 * energy);
         for (k, derivative) in gradient.as_flattened().iter().enumerate() {
             let at = |step: f32| {
                 let mut moved = latent.vectors.clone();

@@ -22,9 +22,9 @@ impl Lobe {
         self.amplitude.map(|a| a * gauss)
     }
 
-    /// The same lobe after a turn by `angle` radians about z, counter-clockwise seen from above.
+    /// The same lobe after a rotation by `angle` radians about z, counter-clockwise seen from above.
     #[must_use]
-    pub fn turned(mut self, angle: f64) -> Self {
+    pub fn rotated(mut self, angle: f64) -> Self {
         let ((s, c), [x, y, z]) = (angle.sin_cos(), self.direction.map(f64::from));
         self.direction = [c * x - s * y, s * x + c * y, z].map(|v| v as f32);
         self
@@ -44,7 +44,7 @@ impl Lobe {
         self
     }
 
-    /// Refuses what is no lobe.
+    /// Refuses what is not a lobe.
     pub(super) fn check(lobes: &[Self]) -> Result<()> {
         if lobes.len() > MAX_LOBES {
             let count = lobes.len();

@@ -1,8 +1,8 @@
-//! The latent code: N vectors in R³ that turn with the scene, its compact lights, and an exposure. MODEL (2), MODEL (71).
+//! The latent code: N vectors in R³ that rotate with the scene, its compact lights, and an exposure. MODEL (2), MODEL (71).
 //!
-//! Turning a panorama by α about z turns every vector, light and lobe by α about z; the x and y of a vector form its equivariant
-//! part, z its invariant part. The paper's code is the vectors alone, of dimension D = 3N; a light and a lobe take seven numbers
-//! each.
+//! Rotating a panorama by α about z rotates every vector, light and lobe by α about z; the x and y of a vector form its
+//! equivariant part, z its invariant part. The paper's code is the vectors alone, of dimension D = 3N; a light and a
+//! lobe take seven numbers each.
 
 mod density;
 mod draw;
@@ -64,18 +64,18 @@ impl Latent {
         Self { source, ..prior.sample(&mut Stream::from_seed(seed)) }
     }
 
-    /// The code of the same scene turned by `radians` about z, counter-clockwise seen from above.
+    /// The code of the same scene rotated by `radians` about z, counter-clockwise seen from above.
     #[must_use]
-    pub fn turned(&self, radians: f64) -> Self {
+    pub fn rotated(&self, radians: f64) -> Self {
         let (sin, cos) = radians.sin_cos();
-        let turn = |[x, y, z]: [f32; 3]| {
+        let rotate = |[x, y, z]: [f32; 3]| {
             let (x, y) = (f64::from(x), f64::from(y));
             [(x * cos - y * sin) as f32, (x * sin + y * cos) as f32, z]
         };
         Self {
-            vectors: self.vectors.iter().copied().map(turn).collect(),
-            lights: self.lights.turned(radians),
-            lobes: self.lobes.iter().map(|lobe| lobe.turned(radians)).collect(),
+            vectors: self.vectors.iter().copied().map(rotate).collect(),
+            lights: self.lights.rotated(radians),
+            lobes: self.lobes.iter().map(|lobe| lobe.rotated(radians)).collect(),
             ..self.clone()
         }
     }
@@ -216,15 +216,15 @@ mod tests {
     }
 
     #[test]
-    fn turns_add_up_and_mirroring_reverses_them() {
+    fn rotations_add_up_and_mirroring_reverses_them() {
         let latent = random(9, 1);
         let close = |a: &Latent, b: &Latent| {
             let pairs = a.vectors.as_flattened().iter().zip(b.vectors.as_flattened());
             pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) < 1e-6
         };
-        assert!(close(&latent.turned(0.3).turned(0.5), &latent.turned(0.8)));
-        assert!(close(&latent.turned(0.7).mirrored(), &latent.mirrored().turned(-0.7)));
-        assert!(!close(&latent.turned(0.7).mirrored(), &latent.mirrored().turned(0.7)));
+        assert!(close(&latent.rotated(0.3).rotated(0.5), &latent.rotated(0.8)));
+        assert!(close(&latent.rotated(0.7).mirrored(), &latent.mirrored().rotated(-0.7)));
+        assert!(!close(&latent.rotated(0.7).mirrored(), &latent.mirrored().rotated(0.7)));
         assert_eq!(latent.mirrored().mirrored(), latent);
     }
 

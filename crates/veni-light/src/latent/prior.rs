@@ -1,8 +1,8 @@
 //! A Gaussian over latent codes that does not prefer a compass direction. MODEL (35).
 //!
-//! With c = x + iy for the N vectors, a distribution that is invariant under turning about z has E c = 0,
+//! With c = x + iy for the N vectors, a distribution that is invariant under rotation about z has E c = 0,
 //! E c cᵀ = 0 and no correlation between c and z. What remains is the Hermitian covariance C = E c cᴴ (how
-//! vectors turn and stretch together) and mean and covariance Σ of z. A sample is c = L w, z = μ + K g, with
+//! vectors rotate and stretch together) and mean and covariance Σ of z. A sample is c = L w, z = μ + K g, with
 //! C = L Lᴴ, Σ = K Kᵀ, w circular complex normal (E|w|² = 1) and g standard normal.
 
 use super::Latent;
@@ -15,7 +15,7 @@ use crate::compact::Lights;
 use crate::random::Stream;
 use crate::{Error, Result};
 
-/// A turn-invariant Gaussian of N latent vectors, a normal log exposure, and what is known of the sun given the vectors.
+/// A rotation-invariant Gaussian of N latent vectors, a normal log exposure, and what is known of the sun given the vectors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
     /// Row-major lower triangles, [N, N].

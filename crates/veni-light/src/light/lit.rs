@@ -11,8 +11,9 @@ use crate::field::Field;
 use crate::sphere::Equirect;
 use crate::{Error, Result};
 
-/// What a surface or a lobe of the sun's size needs to be told of a panorama: a few compact lights, the sun first, and what is left
-/// without them. Per channel the integral of the whole is that of the rest plus the lights' irradiances, by construction.
+/// What a surface or a lobe of the sun's size needs to know of a panorama: a few compact lights, the sun first, and
+/// what is left without them. Per channel the integral of the whole is that of the rest plus the lights' irradiances,
+/// by construction.
 ///
 /// ```
 /// use veni_light::light::{EnvironmentMap, Light};
@@ -31,25 +32,26 @@ use crate::{Error, Result};
 pub struct Light {
     pub(super) grid: Equirect,
     pub(super) residual: Vec<[f32; 3]>,
-    /// The residual before any turn, at about 256 columns.
+    /// The residual before any rotation, at about 256 columns.
     coarse: Level,
     pub(super) lights: Lights,
     shares: Vec<f32>,
     pub(super) harmonics: Sh<2>,
-    /// How far this was turned, radians.
+    /// How far this was rotated, radians.
     pub(super) angle: f64,
 }
 
-/// How lights are told from the rest.
+/// How lights are separated from the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightOptions {
-    /// So many lights are kept at most, the sun first; up to eight. Whether there is a sun, and what it is, does not depend on it.
+    /// The most lights that are kept, the sun first; up to eight. Whether there is a sun, and what it is, does not
+    /// depend on it.
     pub lights: usize,
     /// Lights of a larger angular radius, radians, stay in the map.
     pub widest: f32,
     /// A light's least share of the light on a surface that faces it.
     pub share: f32,
-    /// A light's peak is so many times brighter than what surrounds it.
+    /// How many times brighter a light's peak is than what surrounds it.
     pub contrast: f32,
     /// Which light is the sun.
     pub sun: SunChoice,
@@ -71,7 +73,7 @@ impl Default for LightOptions {
 }
 
 impl LightOptions {
-    /// The most lights that are taken out; so many are always looked for.
+    /// The most lights that are taken out, and the number that is always looked for.
     pub const MOST: usize = Lights::MOST;
 
     /// The light of row-major `pixels`, which become the residual: no copy is made.
@@ -255,12 +257,12 @@ impl Light {
     pub fn irradiance(&self, normal: [f32; 3]) -> [f32; 3] {
         let (sin, cos) = self.angle.sin_cos();
         let [x, y, z] = normal.map(f64::from);
-        // the cells are as they were before the turn
-        let turned = [cos * x + sin * y, cos * y - sin * x, z];
+        // the cells are as they were before the rotation
+        let rotated = [cos * x + sin * y, cos * y - sin * x, z];
         let view = self.coarse.kept();
         let mut sum = [0.0; 3];
         for cell in (0..view.cells().len()).map(|index| view.cell(index)) {
-            let cosine: f64 = cell.direction.iter().zip(turned).map(|(d, n)| d * n).sum();
+            let cosine: f64 = cell.direction.iter().zip(rotated).map(|(d, n)| d * n).sum();
             let weight = cell.solid_angle * cosine.max(0.0);
             sum = [0, 1, 2].map(|c| sum[c] + weight * f64::from(cell.radiance[c]));
         }

@@ -22,11 +22,11 @@ mod lit;
 mod prefilter;
 mod quadrature;
 mod reduce;
+mod rotate;
 mod sampler;
 pub mod sh;
 #[cfg(feature = "prefilter")]
 mod spectrum;
-mod turn;
 mod vector;
 
 pub use crate::compact::{CompactLight, Disc, Kind, Lights, RadiusSource};

@@ -250,7 +250,7 @@ fn a_wide_lobe_is_taken_whole_and_made_a_disc_on_request() {
 }
 
 #[test]
-fn everything_turns_with_the_map() {
+fn everything_rotates_with_the_map() {
     let grid = Equirect::new(256, 128);
     let pixels = scene(
         grid,
@@ -265,26 +265,26 @@ fn everything_turns_with_the_map() {
         let angle = 2.0 * std::f64::consts::PI * columns as f64 / 256.0;
         let mut moved = pixels.clone();
         moved.chunks_exact_mut(256).for_each(|row| row.rotate_left(columns));
-        let (expected, turned) = (light_of(grid, &moved), light.turned(angle));
-        for (a, b) in expected.lights().iter().zip(turned.lights().iter()) {
+        let (expected, rotated) = (light_of(grid, &moved), light.rotated(angle));
+        for (a, b) in expected.lights().iter().zip(rotated.lights().iter()) {
             assert!(degrees(a.direction, b.direction) < 1e-2, "{columns} columns: {a:?} {b:?}");
             assert!(
                 (a.irradiance[0] / b.irradiance[0] - 1.0).abs() < 1e-4 && (a.radius - b.radius).abs() < 1e-4
             );
         }
         for n in [[0.6, 0.8, 0.0], [0.0, 0.0, 1.0]] {
-            let (a, b) = (expected.irradiance(n), turned.irradiance(n));
+            let (a, b) = (expected.irradiance(n), rotated.irradiance(n));
             assert!((a[0] / b[0] - 1.0).abs() < 1e-4, "{a:?} {b:?}");
         }
-        let (a, b) = (expected.sh(), turned.sh());
+        let (a, b) = (expected.sh(), rotated.sh());
         let pairs = a.coefficients().as_flattened().iter().zip(b.coefficients().as_flattened());
         assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-3));
-        let rows = turned.residual().pixels().iter().zip(expected.residual().pixels());
+        let rows = rotated.residual().pixels().iter().zip(expected.residual().pixels());
         let off = rows.map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
         assert!(off < 0.05, "{columns} columns: the residual is {off} off");
     }
     // between columns the energy stays
-    let (a, b) = (light.turned(0.0123).residual().integral(), light.residual().integral());
+    let (a, b) = (light.rotated(0.0123).residual().integral(), light.residual().integral());
     assert!((a[0] / b[0] - 1.0).abs() < 1e-6);
 }
 

@@ -24,8 +24,8 @@ pub struct ModelConfig {
     /// The VN-ViT; absent in a decode-only model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub encoder: Option<EncoderConfig>,
-    /// Most compact lights of a code. So many are taken out of a panorama before the encoder and the losses see it: the field
-    /// describes what is left. 0: the paper's model, whose field holds everything.
+    /// Most compact lights of a code. That many are taken out of a panorama before the encoder and the losses see it:
+    /// the field describes what is left. 0: the paper's model, whose field holds everything.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub lights: usize,
 }

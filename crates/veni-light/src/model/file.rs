@@ -27,9 +27,9 @@ impl Model {
     /// Reads a model file.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be read; [`Error::TooLarge`] beyond a limit of [`crate::limits`];
-    /// [`Error::Invalid`] if it is no safetensors, has no `veni` header, or fails a check of [`Model::new`]; [`Error::Unsupported`] for
-    /// an unknown format, frame or stored type.
+    /// [`Error::Io`] if it cannot be read; [`Error::TooLarge`] beyond a limit of [`crate::limits`]; [`Error::Invalid`]
+    /// if it is not a safetensors file, has no `veni` header, or fails a check of [`Model::new`];
+    /// [`Error::Unsupported`] for an unknown format, frame or stored type.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = read_file(path, "a veni model", MAX_FILE_BYTES)?;

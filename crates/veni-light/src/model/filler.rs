@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_the_authors() {
+    fn keys_are_those_of_the_reference() {
         let mut config = ModelConfig::decode_only(5);
         let key = |name: &str, config: &ModelConfig| official_key(&format!("decoder.{name}"), config);
         assert_eq!(key("input.weight", &config), "network.residual_projection.weight");

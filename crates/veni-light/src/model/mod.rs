@@ -149,8 +149,8 @@ impl Model {
         all.finish().to_string()
     }
 
-    /// Identity of all weights, encoder and prior included: the digest of the JSON of the configuration, then for every tensor in alphabetical order its name, a zero byte, and its
-    /// values as f32, little endian. Provenance does not enter.
+    /// Identity of all weights, encoder and prior included: the digest of the JSON of the configuration, then for every
+    /// tensor in alphabetical order its name, a zero byte, and its values as f32, little endian. Provenance is left out.
     pub fn digest(&self) -> Digest {
         let head = Digest::build().update(serde_json::to_vec(&self.config).unwrap_or_default());
         let all = self.tensors.iter().fold(head, |digest, (name, tensor)| {

@@ -18,7 +18,7 @@ pub fn below(folder: &Path, name: impl AsRef<Path>) -> Result<PathBuf> {
         Error::invalid(format!("names {name}, {why}: nothing outside the folder is touched")).in_file(folder)
     };
     if name.as_os_str().is_empty() {
-        return Err(refused("which is no file"));
+        return Err(refused("which is not a file"));
     }
     let mut path = folder.to_path_buf();
     for component in name.components() {

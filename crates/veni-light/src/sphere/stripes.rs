@@ -88,16 +88,16 @@ impl Stripes {
 
     /// The lookup table for images of `grid`; make it once, use it for every image.
     pub fn gather(&self, grid: Equirect) -> Gather {
-        self.gather_turned(grid, 0.0)
+        self.gather_rotated(grid, 0.0)
     }
 
-    /// The lookup table that sees every image of `grid` turned by `yaw` radians about +z, counter-clockwise seen
+    /// The lookup table that sees every image of `grid` rotated by `yaw` radians about +z, counter-clockwise seen
     /// from above: colours are those of the rotated panorama, directions stay.
-    pub fn gather_turned(&self, grid: Equirect, yaw: f64) -> Gather {
+    pub fn gather_rotated(&self, grid: Equirect, yaw: f64) -> Gather {
         let mut table = Gather::with_capacity(grid, self.stripes * self.samples);
         if self.sampling == StripeSampling::Reference {
             for e in reference::line_directions(self.stripes, self.samples) {
-                let (columns, rows) = reference::pairs(reference::image_uv(turned(e, yaw)), grid);
+                let (columns, rows) = reference::pairs(reference::image_uv(rotated(e, yaw)), grid);
                 table.push(columns, rows);
             }
             return table;
@@ -139,9 +139,9 @@ impl Stripes {
     }
 }
 
-/// An encoder direction turned by [[cos, sin, 0], [−sin, cos, 0], [0, 0, 1]]: what is seen turns the other way.
+/// An encoder direction rotated by [[cos, sin, 0], [−sin, cos, 0], [0, 0, 1]]: what is seen rotates the other way.
 /// A yaw of zero keeps every bit, signed zeros included.
-fn turned([x, y, z]: [f32; 3], yaw: f64) -> [f32; 3] {
+fn rotated([x, y, z]: [f32; 3], yaw: f64) -> [f32; 3] {
     if yaw == 0.0 {
         return [x, y, z];
     }

@@ -11,7 +11,7 @@ pub struct View {
     pub azimuth: f64,
     /// And its elevation above the horizon, radians.
     pub elevation: f64,
-    /// Turn of the camera about its axis, clockwise as the photographer sees it, radians: with a positive roll
+    /// Rotation of the camera about its axis, clockwise as the photographer sees it, radians: with a positive roll
     /// the horizon sinks on the left of the picture.
     pub roll: f64,
 }
@@ -45,8 +45,8 @@ impl View {
         let right = [sa, -ca, 0.0];
         let up = [-se * ca, -se * sa, ce];
         let (sr, cr) = self.roll.sin_cos();
-        let turned = |a: [f64; 3], b: [f64; 3], s: f64| [0, 1, 2].map(|k| cr * a[k] + s * b[k]);
-        [forward, turned(right, up, -sr), turned(up, right, sr)]
+        let rotated = |a: [f64; 3], b: [f64; 3], s: f64| [0, 1, 2].map(|k| cr * a[k] + s * b[k]);
+        [forward, rotated(right, up, -sr), rotated(up, right, sr)]
     }
 
     /// The pixel of a `width` × `height` image that a unit direction falls on, row-major; nothing if it is not
@@ -96,7 +96,7 @@ mod tests {
         assert!(near(north.pixels(3, 3).0[5], [2.0 / 3.0 / s, 1.0 / s, 0.0]));
         let zenith = View { elevation: PI / 2.0, ..view };
         assert!(near(zenith.pixels(1, 1).0[0], [0.0, 0.0, 1.0]));
-        // the camera turned clockwise: its right now points down
+        // the camera rotated clockwise: its right now points down
         let rolled = View { roll: PI / 2.0, ..view };
         assert!(near(rolled.pixels(3, 3).0[5], [1.0 / s, 0.0, -2.0 / 3.0 / s]));
     }

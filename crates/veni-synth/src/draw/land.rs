@@ -1,51 +1,51 @@
 //! What the ground is, and what stands at the horizon.
 
 use crate::random::Draw;
-use crate::scene::{Place, Ridge, RidgeKind};
+use crate::scene::{Ridge, RidgeKind, Setting};
 use crate::surface::{Ground, Pattern, Surface};
 
 /// Surfaces by weight.
 type Choices<'a> = &'a [(f32, Surface)];
 
-/// The ground of a place.
-pub(super) fn ground(draw: &mut Draw, place: Place) -> Ground {
+/// The ground of a setting.
+pub(super) fn ground(draw: &mut Draw, setting: Setting) -> Ground {
     use Surface::{Asphalt, DryGrass, Grass, Leaves, Paving, Rock, Sand, Snow, Soil, Water};
     let snow = draw.chance(0.06);
     let country = [(4.0, Grass), (2.5, DryGrass), (1.5, Soil), (0.8, Sand), (0.7, Rock), (0.3, Asphalt)];
-    let (first, second): (Choices<'_>, Choices<'_>) = match place {
-        Place::PureSky | Place::Plain | Place::Hills => {
+    let (first, second): (Choices<'_>, Choices<'_>) = match setting {
+        Setting::PureSky | Setting::Plain | Setting::Hills => {
             (&country, &[(1.0, Soil), (1.0, DryGrass), (0.6, Asphalt), (0.6, Rock), (1.0, Grass)])
         }
-        Place::Coast => (&[(2.0, Sand), (1.0, Rock), (0.7, Grass), (0.5, Paving)], &[(1.0, Water)]),
-        Place::Lake => (&[(2.0, Grass), (1.0, Sand), (1.0, DryGrass), (0.7, Rock)], &[(1.0, Water)]),
-        Place::Park => {
+        Setting::Coast => (&[(2.0, Sand), (1.0, Rock), (0.7, Grass), (0.5, Paving)], &[(1.0, Water)]),
+        Setting::Lake => (&[(2.0, Grass), (1.0, Sand), (1.0, DryGrass), (0.7, Rock)], &[(1.0, Water)]),
+        Setting::Park => {
             (&[(4.0, Grass), (1.0, DryGrass), (0.5, Leaves)], &[(1.0, Paving), (1.0, Soil), (1.0, Asphalt)])
         }
-        Place::Forest => {
+        Setting::Forest => {
             (&[(2.0, Leaves), (2.0, Soil), (1.0, Grass)], &[(1.0, Soil), (1.0, Leaves), (1.0, Grass)])
         }
-        Place::Village => (&[(3.0, Grass), (1.0, Soil), (1.0, Paving)], &[(1.0, Asphalt), (1.0, Paving)]),
-        Place::Street => (&[(3.0, Paving), (1.0, Asphalt)], &[(3.0, Asphalt), (1.0, Paving)]),
-        Place::Square => {
+        Setting::Village => (&[(3.0, Grass), (1.0, Soil), (1.0, Paving)], &[(1.0, Asphalt), (1.0, Paving)]),
+        Setting::Street => (&[(3.0, Paving), (1.0, Asphalt)], &[(3.0, Asphalt), (1.0, Paving)]),
+        Setting::Square => {
             (&[(3.0, Paving), (1.0, Asphalt), (0.5, Grass)], &[(1.0, Paving), (1.0, Grass), (1.0, Asphalt)])
         }
-        Place::Courtyard => (&[(3.0, Paving), (1.0, Grass), (1.0, Soil)], &[(1.0, Paving), (1.0, Grass)]),
-        Place::Rocks => {
+        Setting::Courtyard => (&[(3.0, Paving), (1.0, Grass), (1.0, Soil)], &[(1.0, Paving), (1.0, Grass)]),
+        Setting::Rocks => {
             (&[(2.0, Sand), (2.0, Rock), (1.0, Soil), (1.0, DryGrass)], &[(1.0, Rock), (1.0, Sand)])
         }
-        Place::Shelter => {
+        Setting::Shelter => {
             (&[(2.0, Paving), (1.0, Asphalt), (1.0, Soil), (1.0, Grass)], &[(1.0, Grass), (1.0, Paving)])
         }
     };
     let (surface, second) = (draw.weighted(first), draw.weighted(second));
     let surface = if snow { Snow } else { surface };
-    let patterns: &[(f32, Pattern)] = match place {
-        Place::Coast | Place::Lake => &[(1.0, Pattern::Shore)],
-        Place::Street => &[(1.0, Pattern::Strip)],
-        Place::Park | Place::Village => {
+    let patterns: &[(f32, Pattern)] = match setting {
+        Setting::Coast | Setting::Lake => &[(1.0, Pattern::Shore)],
+        Setting::Street => &[(1.0, Pattern::Strip)],
+        Setting::Park | Setting::Village => {
             &[(1.5, Pattern::Patches), (1.0, Pattern::Strip), (0.4, Pattern::Rows), (0.6, Pattern::None)]
         }
-        Place::Square | Place::Courtyard => {
+        Setting::Square | Setting::Courtyard => {
             &[(1.5, Pattern::Patches), (0.6, Pattern::Strip), (0.4, Pattern::Rows), (1.5, Pattern::None)]
         }
         _ => &[(2.5, Pattern::Patches), (0.7, Pattern::Strip), (0.7, Pattern::Rows), (0.8, Pattern::None)],
@@ -60,7 +60,7 @@ pub(super) fn ground(draw: &mut Draw, place: Place) -> Ground {
         pattern,
         bearing: draw.azimuth().to_degrees(),
         width: if pattern == Pattern::Shore { shore } else { strip },
-        offset: if place == Place::Street { 0.3 * aside } else { 2.0 * aside },
+        offset: if setting == Setting::Street { 0.3 * aside } else { 2.0 * aside },
         tone: draw.normal(-0.52, 0.32).exp().min(if surface == Snow { 1.1 } else { 2.0 }),
         contrast: draw.normal(0.38, 0.4).exp().min(3.0),
         roughness: draw.range(0.0, 0.9),
@@ -71,29 +71,29 @@ pub(super) fn ground(draw: &mut Draw, place: Place) -> Ground {
     }
 }
 
-/// What closes the horizon of a place.
-pub(super) fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridge> {
+/// What closes the horizon of a setting.
+pub(super) fn ridges(draw: &mut Draw, setting: Setting, ground: &Ground) -> Vec<Ridge> {
     let snowy = ground.surface == Surface::Snow;
     let mut out = Vec::new();
-    let [hills, mountains, trees, town] = match place {
-        Place::PureSky => [0.0; 4],
-        Place::Plain => [0.55, 0.15, 0.45, 0.1],
-        Place::Hills => [1.0, 0.5, 0.5, 0.05],
-        Place::Coast => [0.5, 0.25, 0.15, 0.15],
-        Place::Lake => [0.7, 0.4, 0.9, 0.05],
-        Place::Park => [0.2, 0.05, 0.9, 0.45],
-        Place::Forest => [0.2, 0.0, 1.0, 0.0],
-        Place::Village => [0.5, 0.2, 0.8, 0.4],
-        Place::Street | Place::Square | Place::Courtyard => [0.1, 0.05, 0.5, 1.0],
-        Place::Rocks => [0.6, 0.5, 0.2, 0.0],
-        Place::Shelter => [0.3, 0.1, 0.7, 0.4],
+    let [hills, mountains, trees, town] = match setting {
+        Setting::PureSky => [0.0; 4],
+        Setting::Plain => [0.55, 0.15, 0.45, 0.1],
+        Setting::Hills => [1.0, 0.5, 0.5, 0.05],
+        Setting::Coast => [0.5, 0.25, 0.15, 0.15],
+        Setting::Lake => [0.7, 0.4, 0.9, 0.05],
+        Setting::Park => [0.2, 0.05, 0.9, 0.45],
+        Setting::Forest => [0.2, 0.0, 1.0, 0.0],
+        Setting::Village => [0.5, 0.2, 0.8, 0.4],
+        Setting::Street | Setting::Square | Setting::Courtyard => [0.1, 0.05, 0.5, 1.0],
+        Setting::Rocks => [0.6, 0.5, 0.2, 0.0],
+        Setting::Shelter => [0.3, 0.1, 0.7, 0.4],
     };
     let wild = [(3.0, Surface::Grass), (1.5, Surface::DryGrass), (1.0, Surface::Rock), (1.0, Surface::Soil)];
     let cover = if snowy { Surface::Snow } else { draw.weighted(&wild) };
-    let count = if place == Place::Hills { 3 } else { 2 };
+    let count = if setting == Setting::Hills { 3 } else { 2 };
     for _ in 0..count {
         let distance = draw.log_range(350.0, 9000.0);
-        let slope = draw.log_range(0.02, if place == Place::Hills { 0.3 } else { 0.13 });
+        let slope = draw.log_range(0.02, if setting == Setting::Hills { 0.3 } else { 0.13 });
         let ridge = Ridge {
             kind: RidgeKind::Hills,
             distance,
@@ -122,14 +122,14 @@ pub(super) fn ridges(draw: &mut Draw, place: Place, ground: &Ground) -> Vec<Ridg
     if draw.chance(mountains) {
         out.push(range);
     }
-    let [near, far] = if place == Place::Forest { [32.0, 60.0] } else { [55.0, 500.0] };
-    let open = if place == Place::Forest { 0.0 } else { draw.unit() };
+    let [near, far] = if setting == Setting::Forest { [32.0, 60.0] } else { [55.0, 500.0] };
+    let open = if setting == Setting::Forest { 0.0 } else { draw.unit() };
     let distance = draw.log_range(near, far);
     let wood = Ridge {
         kind: RidgeKind::Trees,
         distance,
-        height: draw.range(6.0, 17.0) + if place == Place::Forest { 6.0 } else { 0.0 },
-        relief: draw.range(0.35, 0.95) * if place == Place::Forest { 0.4 } else { 1.0 },
+        height: draw.range(6.0, 17.0) + if setting == Setting::Forest { 6.0 } else { 0.0 },
+        relief: draw.range(0.35, 0.95) * if setting == Setting::Forest { 0.4 } else { 1.0 },
         surface: Surface::Grass,
         gaps: open,
         snow_line: 1e5,

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::{Builder, Lamp};
 use crate::material::Material;
-use crate::scene::Place;
+use crate::scene::Setting;
 use crate::solid::Shape;
 
 impl Builder {
@@ -51,11 +51,14 @@ impl Builder {
     }
 
     /// A few lux, as on any lit street.
-    pub(super) fn street_light(&mut self, place: Place) {
+    pub(super) fn street_light(&mut self, setting: Setting) {
         let level = self.draw.log_range(4e-4, 8e-3);
         let warm = self.draw.unit();
         let colour = Vec3::new(1.7, 0.85, 0.25).lerp(Vec3::new(1.1, 1.0, 0.8), warm);
-        if matches!(place, Place::Street | Place::Square | Place::Courtyard | Place::Village | Place::Park) {
+        if matches!(
+            setting,
+            Setting::Street | Setting::Square | Setting::Courtyard | Setting::Village | Setting::Park
+        ) {
             self.layout.street_light = level * colour;
         }
     }

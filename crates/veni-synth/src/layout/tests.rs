@@ -1,4 +1,4 @@
-//! What stands around the viewer, over many scenes of every place: nothing where he stands, nothing in the air, lamps
+//! What stands around the viewer, over many scenes of every setting: nothing where he stands, nothing in the air, lamps
 //! at night only.
 
 use super::*;
@@ -6,13 +6,13 @@ use crate::draw::Overrides;
 use crate::scene::SkyKind;
 use veni_image::luminance;
 
-/// Scenes of every place under this sky, this many of each.
+/// Scenes of every setting under this sky, this many of each.
 fn scenes(sky: SkyKind, each: u64) -> impl Iterator<Item = Scene> {
-    let of = move |place| {
-        let overrides = Overrides { sky: Some(sky), place: Some(place), ..Overrides::default() };
+    let of = move |setting| {
+        let overrides = Overrides { sky: Some(sky), setting: Some(setting), ..Overrides::default() };
         (0..each).map(move |index| Scene::draw(21, index, &overrides))
     };
-    Place::ALL.into_iter().flat_map(of)
+    Setting::ALL.into_iter().flat_map(of)
 }
 
 fn layouts(sky: SkyKind, each: u64) -> impl Iterator<Item = (Scene, Layout)> {
@@ -23,7 +23,7 @@ fn layouts(sky: SkyKind, each: u64) -> impl Iterator<Item = (Scene, Layout)> {
 }
 
 fn name(scene: &Scene) -> String {
-    format!("{} {} under a {} sky", scene.place.name(), scene.index, scene.sky.name())
+    format!("{} {} under a {} sky", scene.setting.name(), scene.index, scene.sky.name())
 }
 
 fn flat(v: Vec3) -> Vec2 {
@@ -77,7 +77,7 @@ fn the_viewer_stands_in_nothing() {
             assert!(around.is_none(), "{}: {p} is in {around:?}", name(&scene));
         }
         // leaves begin far above
-        assert_eq!(layout.canopy.is_some(), scene.place == Place::Forest, "{}", name(&scene));
+        assert_eq!(layout.canopy.is_some(), scene.setting == Setting::Forest, "{}", name(&scene));
         assert!(layout.canopy.is_none_or(|c| c.height > scene.eye + 4.0), "{}", name(&scene));
     }
 }
@@ -85,7 +85,7 @@ fn the_viewer_stands_in_nothing() {
 #[test]
 fn a_pure_sky_is_empty() {
     for sky in SkyKind::ALL {
-        for (scene, layout) in layouts(sky, 30).filter(|(s, _)| s.place == Place::PureSky) {
+        for (scene, layout) in layouts(sky, 30).filter(|(s, _)| s.setting == Setting::PureSky) {
             let things = (layout.solids.len(), layout.lamps.len(), scene.ridges.len());
             assert_eq!(things, (0, 0, 0), "{}", name(&scene));
         }
@@ -102,17 +102,17 @@ fn houses_stand_on_the_ground_as_high_as_houses_are() {
             // in a street 4.5 m · 0.55 at least, at a square 26 m · 1.5 and a roof of 4 m at most
             assert!(low == 0.0 && (2.47..43.1).contains(&high), "{}: {low} to {high} m", name(&scene));
         }
-        counts.entry(scene.place.name()).or_default().push(houses.len());
+        counts.entry(scene.setting.name()).or_default().push(houses.len());
     }
-    let most = |place: Place| *counts[place.name()].iter().max().unwrap();
-    let least = |place: Place| *counts[place.name()].iter().min().unwrap();
-    for place in [Place::PureSky, Place::Lake, Place::Forest, Place::Rocks] {
-        assert_eq!(most(place), 0, "{}", place.name());
+    let most = |setting: Setting| *counts[setting.name()].iter().max().unwrap();
+    let least = |setting: Setting| *counts[setting.name()].iter().min().unwrap();
+    for setting in [Setting::PureSky, Setting::Lake, Setting::Forest, Setting::Rocks] {
+        assert_eq!(most(setting), 0, "{}", setting.name());
     }
-    assert!(least(Place::Village) >= 2 && most(Place::Village) <= 10);
+    assert!(least(Setting::Village) >= 2 && most(Setting::Village) <= 10);
     // two rows of 165 m, of houses of 6 to 26 m
-    assert!(least(Place::Street) >= 8 && most(Place::Street) <= 58);
-    assert!(least(Place::Square) >= 3 && most(Place::Square) <= 11);
+    assert!(least(Setting::Street) >= 8 && most(Setting::Street) <= 58);
+    assert!(least(Setting::Square) >= 3 && most(Setting::Square) <= 11);
 }
 
 #[test]
@@ -124,8 +124,8 @@ fn walls_close_a_courtyard_and_leave_a_street_open() {
     let (mut closed, mut count) = (0.0, 0);
     for (scene, mut layout) in layouts(SkyKind::Cloudy, 30) {
         let eye = Vec3::Z * scene.eye;
-        match scene.place {
-            Place::Street => {
+        match scene.setting {
+            Setting::Street => {
                 let along = Vec2::from_angle(scene.ground.bearing.to_radians());
                 let walls = walls(&mut layout);
                 for towards in [along, -along] {
@@ -141,7 +141,7 @@ fn walls_close_a_courtyard_and_leave_a_street_open() {
                     name(&scene)
                 );
             }
-            Place::Courtyard => {
+            Setting::Courtyard => {
                 let walls = walls(&mut layout);
                 let up = 5f32.to_radians().tan();
                 let around = (0..360).filter(|a| {
@@ -187,7 +187,9 @@ fn plants_and_cars_stand_on_the_ground() {
                 // boxes on the ground, on wheels, on a car, on the pillars of a roof; and boulders
                 Shape::Hull { .. } => {
                     let low = extent(&solid.shape).map_or(0.0, |[low, _]| low);
-                    low <= 0.2 || low == 0.9 || scene.place == Place::Shelter && (2.6..=6.0).contains(&low)
+                    low <= 0.2
+                        || low == 0.9
+                        || scene.setting == Setting::Shelter && (2.6..=6.0).contains(&low)
                 }
                 Shape::Trunk { .. } => true,
             };
@@ -198,7 +200,7 @@ fn plants_and_cars_stand_on_the_ground() {
                 assert!(stands, "{}: {solid:?}", name(&scene));
             }
         }
-        if scene.place == Place::Lake {
+        if scene.setting == Setting::Lake {
             let shore = Vec2::from_angle(scene.ground.bearing.to_radians());
             // no more than the one tree that may stand close by
             let wet: Vec<_> =
@@ -213,7 +215,7 @@ fn plants_and_cars_stand_on_the_ground() {
 
 #[test]
 fn lamps_are_lit_at_night_only_and_as_bright_as_lamps_are() {
-    let settled = [Place::Street, Place::Square, Place::Courtyard, Place::Village, Place::Park];
+    let settled = [Setting::Street, Setting::Square, Setting::Courtyard, Setting::Village, Setting::Park];
     let windows = |layout: &Layout| {
         let lit = |s: &Solid| matches!(s.material, Material::Facade { lit, .. } if lit > 0.0);
         layout.solids.iter().filter(|s| lit(s)).count()
@@ -222,7 +224,7 @@ fn lamps_are_lit_at_night_only_and_as_bright_as_lamps_are() {
         for (scene, layout) in layouts(sky, 20) {
             let dark = scene.sun_elevation < 0.5;
             assert!(dark || !scene.lit, "{}", name(&scene));
-            assert!(scene.lit || !dark || !settled.contains(&scene.place), "{}", name(&scene));
+            assert!(scene.lit || !dark || !settled.contains(&scene.setting), "{}", name(&scene));
             if !scene.lit {
                 let burning = (layout.lamps.len(), windows(&layout), layout.street_light);
                 assert_eq!(burning, (0, 0, Vec3::ZERO), "{}", name(&scene));
@@ -232,7 +234,7 @@ fn lamps_are_lit_at_night_only_and_as_bright_as_lamps_are() {
             assert_eq!(windows(&layout), houses, "{}", name(&scene));
             // 0.4 to 8 lx
             let street = luminance(layout.street_light.to_array());
-            let range = if settled.contains(&scene.place) { 3.8e-4..8.4e-3 } else { 0.0..1e-9 };
+            let range = if settled.contains(&scene.setting) { 3.8e-4..8.4e-3 } else { 0.0..1e-9 };
             assert!(range.contains(&street), "{}: {street} klx", name(&scene));
             for lamp in &layout.lamps {
                 let (distance, candela) =

@@ -1,9 +1,9 @@
 //! Fits the LDR → HDR expansion to HDR panoramas, measures it, and shows it.
 //!
 //! ```text
-//! cargo run --release -p veni-core --no-default-features --example expansion -- fit DIR
-//! cargo run --release -p veni-core --no-default-features --example expansion -- measure DIR [TRAIN_DIR]
-//! cargo run --release -p veni-core --no-default-features --example expansion -- picture OUT.png IN.exr…
+//! cargo run --release -p veni-research --example expansion -- fit DIR
+//! cargo run --release -p veni-research --example expansion -- measure DIR [TRAIN_DIR]
+//! cargo run --release -p veni-research --example expansion -- picture OUT.png IN.exr…
 //! ```
 //! Every panorama is exposed so that its geometric mean luminance is middle grey, and 1 stop less, 1 and 2 more; clipped,
 //! coded in 8-bit sRGB, expanded, and compared with what it was. `measure` tables the expansion beside plain linearisation

@@ -114,7 +114,7 @@ impl Limits {
 
 /// Where radiance goes.
 enum Target {
-    /// So many rows of pixels, or the whole panorama; used again for the rows that follow.
+    /// Some rows of pixels, or the whole panorama; used again for the rows that follow.
     Rows(Buffer, u32),
     /// In half precision.
     Texture(Texture),

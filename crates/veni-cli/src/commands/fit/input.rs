@@ -34,7 +34,7 @@ pub(crate) struct Input {
     fov: Option<f64>,
 
     /// Where the photograph's centre looks: azimuth (counter-clockwise from the panorama's centre, seen from above),
-    /// elevation, and how far the camera was turned clockwise [default: 0,0,0]
+    /// elevation, and how far the camera was rotated clockwise [default: 0,0,0]
     #[arg(long, value_name = "AZIMUTH[,ELEVATION[,ROLL]]", value_parser = look, allow_hyphen_values = true,
         requires = "fov")]
     look: Option<Look>,

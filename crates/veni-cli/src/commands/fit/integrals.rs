@@ -15,7 +15,7 @@ use super::model::FitModel;
 use super::settings::{Settings, Start};
 use crate::numbers::positive;
 use crate::piped;
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::Report;
 
 /// What a level surface faces.
@@ -43,7 +43,8 @@ pub(super) struct Integrals {
         "objective", "share", "exposure"])]
     target_irradiance: Option<PathBuf>,
 
-    /// Scale what is found so that a level surface receives so many lux, radiance being in cd/m²; alone, it is a likely light
+    /// Scale what is found so that a level surface receives this many lux, radiance being in cd/m²; alone, it is a
+    /// likely light
     #[arg(long, value_name = "LUX", value_parser = positive)]
     illuminance: Option<f64>,
 }
@@ -123,12 +124,12 @@ impl Integrals {
         report: Report,
     ) -> Result<Best> {
         let (prior, vectors) = (model.prior(), model.latent_vectors());
-        let bars = Bars::new(report);
+        let progress = ProgressBars::new(report);
         // the first start is led by four weights of the prior
-        bars.begin("", "step", Some(config.most_updates(vectors) * (starts.len() as u64 + 3)));
-        let mut observer = |step, loss| bars.advance(step, &format!("loss {loss:.6}"));
+        progress.begin("", "step", Some(config.most_updates(vectors) * (starts.len() as u64 + 3)));
+        let mut observer = |step, loss| progress.advance(step, &format!("loss {loss:.6}"));
         let best = best_linear(model.decoder(), target, &prior, starts, config, &mut observer);
-        bars.end();
+        progress.end();
         Ok(best?)
     }
 

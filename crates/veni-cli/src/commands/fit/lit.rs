@@ -24,8 +24,8 @@ pub(super) struct LitArgs {
 }
 
 impl LitArgs {
-    /// So many lights are looked for in a picture, where a model was trained without `usual`: none in part of one (`view`: of a
-    /// photograph), nor where values are cut off.
+    /// The number of lights that are looked for in a picture, where a model was trained without `usual`: none in part
+    /// of one (`view`: of a photograph), nor where values are cut off.
     pub(super) fn most(&self, usual: usize, picture: &Picture, view: bool, report: Report) -> usize {
         let [width, height] = picture.size();
         let seen = width == 2 * height && !picture.is_partial() && !view;

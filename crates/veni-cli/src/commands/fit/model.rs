@@ -51,7 +51,7 @@ impl FitModel {
         self.model.prior()
     }
 
-    /// So many lights were taken out of the panoramas that it was trained on.
+    /// The number of lights that were taken out of the panoramas that it was trained on.
     pub(super) fn lights(&self) -> usize {
         self.model.config().lights
     }

@@ -186,7 +186,7 @@ impl Settings {
             };
         }
         match (self.share, &mut config.objective) {
-            (Some(part), Objective::Energy { share }) => *share = part,
+            (Some(part), Objective::Energy { weight }) => *weight = part,
             (Some(_), _) => {
                 bail!(
                     "--share: only the objective energy has an energy weight; add --preset energy, or leave it out"

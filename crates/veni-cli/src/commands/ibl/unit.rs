@@ -31,9 +31,9 @@ impl Unit {
         let mean = f64::from(map.mean_log_luminance()).exp();
         if limited > 0.0 && mean < DARK {
             // as bright as fits, and no brighter than a mean of 1
-            let room = (LARGEST / limited).log2().floor();
+            let headroom = (LARGEST / limited).log2().floor();
             let wish = (-mean.max(1e-30).log2()).floor() as f32;
-            return Self(room.min(wish).exp2());
+            return Self(headroom.min(wish).exp2());
         }
         Self(1.0)
     }

@@ -39,7 +39,7 @@ pub(super) fn describe(path: &Path, layer: &Layer) -> Result<Facts> {
     {
         facts.attribute(name, value);
     }
-    // a rendered picture is no panorama
+    // a rendered image is not a panorama
     if !cube && !attributes.contains_key(CAMERA) {
         radiance(Panorama::read_with(path, &layer.options()).map_err(with_remedy)?, path, &mut facts)?;
     }

@@ -22,10 +22,10 @@ pub(super) fn note(gone: &[String], report: Report) {
     match count {
         0 => {}
         1 => report.note(format_args!(
-            "{first}: this source is gone, its image is kept; --force begins anew without it"
+            "{first}: this source is gone, its image is kept; --force starts over without it"
         )),
         _ => report.note(format_args!(
-            "{first} and {} more sources are gone, their images are kept (listed in report.md); --force begins anew without \
+            "{first} and {} more sources are gone, their images are kept (listed in report.md); --force starts over without \
              them",
             count - 1
         )),

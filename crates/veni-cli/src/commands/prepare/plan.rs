@@ -25,17 +25,17 @@ pub(super) fn checked(root: &Path, place: &str) -> Result<PathBuf> {
     let is_split = Split::ALL.iter().any(|split| folder == Some(split.folder()));
     if !is_split || name.extension().is_none_or(|e| e != "exr") {
         bail!(
-            "{}: is no name of a prepared image (train/…, val/… or test/… .exr); nothing was touched",
+            "{}: is not the name of a prepared image (train/…, val/… or test/… .exr); nothing was touched",
             path.display()
         );
     }
     Ok(path)
 }
 
-/// Refuses what is no image's id, of which names of files are made.
+/// Refuses what is not an image's id, of which names of files are made.
 pub(super) fn check_id(file: &Path, id: &str) -> Result<()> {
     if id.len() != 16 || !id.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b)) {
-        bail!("{}: names an image {id:?}, which is no hash; nothing was touched", file.display());
+        bail!("{}: names an image {id:?}, which is not a hash; nothing was touched", file.display());
     }
     Ok(())
 }

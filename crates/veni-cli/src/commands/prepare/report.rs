@@ -40,7 +40,7 @@ pub(super) fn write(
     let alike: Vec<Value> = placed.alike.iter().map(|(first, second, bond)| {
         let l = bond.likeness;
         json!({
-            "first": first, "second": second, "correlation": l.around, "turn_degrees": l.turn.to_degrees(),
+            "first": first, "second": second, "correlation": l.around, "rotation_degrees": l.rotation.to_degrees(),
             "mirrored": l.mirrored,
         })
     }).collect();
@@ -172,9 +172,9 @@ fn markdown(
             let l = bond.likeness;
             let mirrored = if l.mirrored { ", mirrored" } else { "" };
             format!(
-                "{first} and {second}: correlation {:.3}, turned by {:.0}°{mirrored}",
+                "{first} and {second}: correlation {:.3}, rotated by {:.0}°{mirrored}",
                 l.around,
-                l.turn.to_degrees().round() + 0.0
+                l.rotation.to_degrees().round() + 0.0
             )
         }),
     )?;

@@ -39,7 +39,7 @@ pub(super) struct Source {
 pub(super) struct Found {
     /// In the order of their paths, each once.
     pub(super) sources: Vec<Source>,
-    /// Files that are no images.
+    /// Files that are not images.
     pub(super) ignored: Vec<PathBuf>,
     /// What could not be looked at, and why: it costs itself alone.
     pub(super) unreadable: Vec<(PathBuf, String)>,

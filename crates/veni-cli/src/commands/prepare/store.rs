@@ -232,7 +232,7 @@ impl Store {
             places.push(place.clone());
         }
         self.write_plan(both)?;
-        // an image made anew waits while its former self is still in place
+        // an image made again waits while its former self is still in place
         let owned: BTreeSet<PathBuf> = self.plan.keys().filter_map(|id| self.image(id)).collect();
         for (_, places) in self.plan.iter().filter(|(id, _)| self.waiting(id).is_file()) {
             for former in places.iter().map(|place| self.root.join(place)).filter(|p| !owned.contains(p)) {

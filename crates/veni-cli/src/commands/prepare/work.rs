@@ -13,10 +13,10 @@ use super::record::{Facts, Fate, Record};
 use super::scan::Source;
 use super::store::Store;
 use crate::output::{CHOOSE_LAYER, with_remedy};
-use crate::progress::Bars;
+use crate::progress::ProgressBars;
 use crate::report::{Report, complain};
 
-/// The brightest value that is written without a factor, with room for rounding.
+/// The brightest value that is written without a factor, with headroom for rounding.
 const BRIGHTEST: f32 = 60_000.0;
 /// A mean luminance below this loses digits in half precision: 2⁻⁸.
 const DARKEST: f32 = 1.0 / 256.0;
@@ -34,8 +34,8 @@ pub(super) fn examine_all(
     if skipped > 0 {
         report.note(format_args!("{skipped} of {} files were examined before", sources.len()));
     }
-    let bars = Bars::new(report);
-    bars.begin_after(skipped as u64, "", "file", Some(sources.len() as u64));
+    let progress = ProgressBars::new(report);
+    progress.begin_after(skipped as u64, "", "file", Some(sources.len() as u64));
     let store = Mutex::new(store);
     // as many at a time as there is memory for the pixels that their headers declare
     parallel(todo.len(), |at| -> Result<()> {
@@ -46,10 +46,10 @@ pub(super) fn examine_all(
             complain(&format!("{}: {reason}", source.path.display()));
         }
         lock(&store).add(Record::new(source, fate))?;
-        bars.add(1);
+        progress.add(1);
         Ok(())
     })?;
-    bars.end();
+    progress.end();
     Ok(())
 }
 
@@ -135,7 +135,7 @@ mod tests {
         assert_eq!(of([0.5, 2.0, 50_000.0]), half(1.0));
         assert_eq!(of([0.5, 2.0, 100_000.0]), half(0.5));
         assert_eq!(of([0.5, 2.0, 1e-3]), half(1.0));
-        // one dark value in six: there is room above
+        // one dark value in six: there is headroom
         assert_eq!(of([0.5, 2.0, 1e-7]), half(16384.0));
         assert_eq!(of([0.5, 20_000.0, 1e-7]), (Precision::Float, HalfRange::Refuse));
     }

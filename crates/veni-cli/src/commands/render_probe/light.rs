@@ -11,7 +11,7 @@ use crate::output::{CUBE_FACES, with_remedy};
 use crate::report::Report;
 use crate::source::{self, Loaded};
 
-/// Radiance of every light of a file's panorama or latent, turned by `turn` radians.
+/// Radiance of every light of a file's panorama or latent, rotated by `turn` radians.
 pub(super) fn from_file(
     path: &Path,
     layer: &Layer,
@@ -29,7 +29,7 @@ pub(super) fn from_file(
         bail!("{}: a cube map is not a panorama; name an equirectangular image", path.display());
     }
     let image = source::panorama(path, layer, report)?;
-    Ok(image.resample_turned(grid, turn).into_pixels())
+    Ok(image.resample_rotated(grid, turn).into_pixels())
 }
 
 /// The same of a random sky.
@@ -40,5 +40,5 @@ pub(super) fn seeded(seed: u64, model: &ModelArgs, grid: Equirect, turn: f64) ->
 }
 
 fn decode(loaded: &Loaded, latent: &Latent, grid: Equirect, turn: f64) -> Result<Vec<[f32; 3]>> {
-    Ok(loaded.model.decoder()?.condition(&latent.turned(turn))?.bake(grid))
+    Ok(loaded.model.decoder()?.condition(&latent.rotated(turn))?.bake(grid))
 }

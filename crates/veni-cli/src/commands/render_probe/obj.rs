@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn double_precision_turns_as_single_precision_does() {
+    fn double_precision_rotates_as_single_precision_does() {
         let path = tempfile::tempdir().unwrap();
         let path = path.path().join("a.obj");
         std::fs::write(&path, "v 1 2 3\nv 4 5 6\nv 7 8 10\nf 1 2 3\n").unwrap();

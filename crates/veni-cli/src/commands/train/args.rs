@@ -117,7 +117,7 @@ pub(crate) struct Train {
     #[arg(long, value_name = "I,J,…")]
     pub(super) devices: Option<Devices>,
 
-    /// Multiply the decoder's matrices in bfloat16, sums and all else in f32 (decoder_by = kernels-bfloat16): faster on
+    /// Multiply the decoder's matrices in bfloat16, sums and all else in f32 (decoder_backend = kernels-bfloat16): faster on
     /// processors with AVX512-BF16, an error on others
     #[arg(long)]
     pub(super) mixed_precision: bool,

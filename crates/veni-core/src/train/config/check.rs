@@ -26,8 +26,8 @@ impl TrainConfig {
         if self.decoder_backend == DecoderBackend::KernelsBfloat16 {
             self.model.decoder.check_folds().map_err(|_| {
                 Error::invalid(
-                    "decoder_by = kernels-bfloat16: kernels compute the paper's decoder only (attention, vn, so2); take \
-                     decoder_by = tensors",
+                    "decoder_backend = kernels-bfloat16: kernels compute the paper's decoder only (attention, vn, so2); take \
+                     decoder_backend = tensors",
                 )
             })?;
         }

@@ -13,7 +13,7 @@ pub enum LossGrid {
         /// Pixels per side of a cell; must divide width and height.
         factor: usize,
     },
-    /// Every `factor`-th pixel of every `factor`-th row, from an offset drawn anew in each step: exact pixel
+    /// Every `factor`-th pixel of every `factor`-th row, from an offset drawn in each step: exact pixel
     /// values, and every pixel in its turn. (Rows are weighted as if each were in the middle of its
     /// neighbours; over the offsets that evens out.)
     Strided {

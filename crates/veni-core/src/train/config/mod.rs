@@ -51,7 +51,7 @@ pub struct TrainConfig {
     pub devices: Devices,
     /// The decoder backend. A file that does not say it means what is best on its device
     /// ([`DeviceKind::decoder_backend`]).
-    #[serde(default, rename = "decoder_by")]
+    #[serde(default, alias = "decoder_by")]
     pub decoder_backend: DecoderBackend,
     /// Decay of the averaged weights, which are validated and become the model; 0 takes the last weights.
     pub ema_decay: f64,
@@ -123,7 +123,9 @@ impl TrainConfig {
     /// [`Error::Invalid`] naming the key and line that do not fit.
     pub fn from_toml(text: &str) -> Result<Self> {
         let mut config: Self = toml::from_str(text).map_err(|e| Error::invalid(e.to_string()))?;
-        if toml::from_str::<toml::Table>(text).is_ok_and(|table| !table.contains_key("decoder_by")) {
+        let named =
+            |table: toml::Table| ["decoder_backend", "decoder_by"].iter().any(|key| table.contains_key(*key));
+        if toml::from_str(text).is_ok_and(|table| !named(table)) {
             config.decoder_backend = config.device.decoder_backend();
         }
         config.check()?;

@@ -9,9 +9,9 @@ use veni_fit::schedule::LearningRate;
 impl TrainConfig {
     /// The configuration with dotted keys replaced: each override is `key.path=value`, the value in TOML
     /// (bare words are taken as strings). With `steps`, learning rates that fell until the old last step fall
-    /// until the new one; another `device` brings its `decoder_by` along and is the first of its kind, unless `decoder_by`
-    /// and `devices` are named too ([`Self::set_device`]). `stage.NAME.key.path` changes a stage, and with its steps those
-    /// of the run.
+    /// until the new one; another `device` brings its `decoder_backend` along and is the first of its kind, unless
+    /// `decoder_backend` and `devices` are named too ([`Self::set_device`]). `stage.NAME.key.path` changes a stage, and
+    /// with its steps those of the run. Keys may have the names that they had in earlier files.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the override that has no `=`, no such key, or a value of the wrong type.
@@ -22,8 +22,8 @@ impl TrainConfig {
         let mut named = Vec::new();
         for text in overrides.iter().map(AsRef::as_ref) {
             let (path, value) = text.split_once('=').ok_or_else(|| broken(text, &"has no `=`"))?;
-            let path = path.trim();
-            named.push(path);
+            let path = &present(path.trim());
+            named.push(path.clone());
             let mut table = Table::try_from(&config).map_err(|e| broken(text, &e))?;
             let value = parse_value(value.trim());
             set(&mut table, path, value).map_err(|e| broken(text, &e))?;
@@ -40,10 +40,10 @@ impl TrainConfig {
         if config.device != self.device {
             let mut other = self.clone();
             other.set_device(config.device);
-            if !named.contains(&"decoder_by") {
+            if !named.iter().any(|path| path == "decoder_backend") {
                 config.decoder_backend = other.decoder_backend;
             }
-            if !named.contains(&"devices") {
+            if !named.iter().any(|path| path == "devices") {
                 config.devices = other.devices;
             }
         }
@@ -64,6 +64,27 @@ impl TrainConfig {
             }
         }
         self.steps = steps;
+    }
+}
+
+/// Keys that had another name in earlier files: serde reads both, but only the present one replaces what is there.
+const FORMER: [(&str, &str); 2] = [("decoder_by", "decoder_backend"), ("loss.level", "loss.exposure")];
+
+/// A dotted key, of a stage or not, by its present name.
+fn present(path: &str) -> String {
+    let renamed = FORMER.iter().find_map(|(former, present)| {
+        let before = path.strip_suffix(former).filter(|before| before.is_empty() || before.ends_with('.'));
+        before.map(|before| format!("{before}{present}"))
+    });
+    renamed.unwrap_or_else(|| path.to_owned())
+}
+
+/// Gives the keys of a table of changes their present names.
+pub(super) fn rename_former(changes: &mut Table) {
+    if let Some(Value::Table(loss)) = changes.get_mut("loss")
+        && let Some(weight) = loss.remove("level")
+    {
+        loss.entry("exposure").or_insert(weight);
     }
 }
 

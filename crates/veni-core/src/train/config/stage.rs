@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use super::TrainConfig;
-use super::overrides::float_where_float;
+use super::overrides::{float_where_float, rename_former};
 use crate::{Error, Result};
 use veni_data::PixelStorage;
 use veni_light::model::ModelKind;
@@ -116,6 +116,7 @@ impl TrainConfig {
         let text = |e: &dyn std::fmt::Display| Error::invalid(e.to_string());
         let mut table = Table::try_from(&whole).map_err(|e| text(&e))?;
         let mut changes = stage.changes.clone();
+        rename_former(&mut changes);
         if let Some(Value::Table(data)) = changes.get_mut("data")
             && data.contains_key("folders")
         {

@@ -48,6 +48,27 @@ fn what_is_wrong_is_named() {
     assert!(checked("ema_decay=1.0").contains("ema_decay = 1"));
     assert!(checked("augment.mix=2.0").contains("augment.mix = 2"));
 }
+
+#[test]
+fn keys_of_earlier_files_are_read_by_their_present_names() {
+    let old = ["loss.level=0.25", "decoder_by=tensors", "stage.a.loss.level=0.5"];
+    let new = ["loss.exposure=0.25", "decoder_backend=tensors", "stage.a.loss.exposure=0.5"];
+    let mut config = Preset::Small.config(9);
+    config.stage = vec![stage("a", config.steps, "")];
+    let config = config.with_overrides(&new).unwrap();
+    let same = Preset::Small.config(9);
+    let same = TrainConfig { stage: vec![stage("a", same.steps, "")], ..same }.with_overrides(&old).unwrap();
+    assert_eq!(same, config);
+    assert_ne!(config.loss, Preset::Small.config(9).loss);
+
+    let text = config.to_toml().unwrap();
+    let former = text.replace("exposure = 0.", "level = 0.").replace("decoder_backend", "decoder_by");
+    assert!(former.contains("level = 0.25") && former.contains("level = 0.5"), "{former}");
+    let read = TrainConfig::from_toml(&former).unwrap();
+    assert_eq!((&read.loss, read.decoder_backend), (&config.loss, config.decoder_backend));
+    assert_eq!(read.stages().unwrap()[0].config.loss, config.stages().unwrap()[0].config.loss);
+}
+
 #[test]
 fn what_belongs_to_the_other_system_is_refused() {
     let refused = |config: &TrainConfig, text: &[&str]| {

@@ -161,10 +161,10 @@ impl Loss {
                 LossForm::Reference => scale_invariant::reference(p, i, rows).mean(),
             }
         });
-        put("level", &config.level, &|| {
+        put("exposure", &config.exposure, &|| {
             let (p, i, rows) = images();
             let weights = if self.rays { rows } else { rows::solid_angle(p.dims()[1], &p.device()) };
-            scale_invariant::level(p, i, weights)
+            scale_invariant::exposure(p, i, weights)
         });
         put("cosine", &config.cosine, &|| {
             let (p, i, rows) = images();

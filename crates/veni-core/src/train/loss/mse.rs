@@ -78,7 +78,7 @@ fn display(log_radiance: Tensor<4>, white: Tensor<4>) -> Tensor<4> {
 }
 
 /// Only the brightest part of each target: the mean squared log error over the values of an image that are
-/// among its ⌊`fraction` · count⌋ largest. The authors divide by the number of all values instead.
+/// among its ⌊`fraction` · count⌋ largest. The reference implementation divides by the number of all values instead.
 /// `[B, ..]` → `[1]`.
 ///
 /// # Panics

@@ -13,9 +13,9 @@ pub fn scale_invariant(prediction: Tensor<4>, target: Tensor<4>, weights: Tensor
     (deviation.clone() * deviation * weights).mean()
 }
 
-/// The complement of [`scale_invariant`]: R̄² per image, mean over the images. It pins the absolute level,
+/// The complement of [`scale_invariant`]: R̄² per image, mean over the images. It pins the exposure,
 /// which the other corrected losses leave free; together they are the weighted log MSE. → `[1]`.
-pub fn level(prediction: Tensor<4>, target: Tensor<4>, weights: Tensor<4>) -> Tensor<1> {
+pub fn exposure(prediction: Tensor<4>, target: Tensor<4>, weights: Tensor<4>) -> Tensor<1> {
     let error = (prediction - target) * weights;
     let [batch, height, width, channels] = error.dims();
     let mean = error.reshape([batch, height * width * channels]).mean_dim(1);

@@ -36,7 +36,7 @@ fn all_on(form: LossForm) -> LossConfig {
         form,
         mage: one,
         scale_invariant: one,
-        level: one,
+        exposure: one,
         cosine: one,
         kld: one,
         log_mse: one,
@@ -76,11 +76,11 @@ fn corrected_terms_do_not_see_a_factor_and_reference_terms_do() {
 fn scale_invariant_and_level_add_up_to_the_log_error() {
     let values = terms(&all_on(LossForm::Corrected), image(0.4), image(0.0));
     let get = |name: &str| values.iter().find(|v| v.0 == name).unwrap().1;
-    assert!((get("scale_invariant") + get("level") - get("log_mse")).abs() < 1e-5);
+    assert!((get("scale_invariant") + get("exposure") - get("log_mse")).abs() < 1e-5);
 }
 
 #[test]
-fn corrected_terms_turn_with_the_image() {
+fn corrected_terms_rotate_with_the_image() {
     let roll = |x: Tensor<4>| Tensor::cat(vec![x.clone().narrow(2, 6, W - 6), x.narrow(2, 0, 6)], 2);
     // the surfaces of the irradiance term are 26, at multiples of 45°
     let irradiance = WeightSchedule::Constant(0.0);
@@ -111,13 +111,13 @@ fn the_irradiance_term_sees_factors_and_small_bright_things() {
 }
 
 #[test]
-fn mage_measures_slopes() {
+fn mage_measures_gradients() {
     // R rises by 0.01 per row and nothing else; Scharr's taps sum to 32 over a difference of two rows,
-    // 16 × 2 × the slope.
+    // 16 × 2 × the gradient.
     let rows: Vec<f32> = (0..H).flat_map(|j| vec![0.01 * j as f32; W * 3]).collect();
-    let slope: Tensor<4> = Tensor::from_data(TensorData::new(rows, [1, H, W, 3]), &Device::flex());
+    let ramp: Tensor<4> = Tensor::from_data(TensorData::new(rows, [1, H, W, 3]), &Device::flex());
     let mage = mage::Mage::new(1, H, W, &Device::flex());
-    let value = number(mage.loss(slope.clone(), slope.zeros_like()));
+    let value = number(mage.loss(ramp.clone(), ramp.zeros_like()));
     assert!((value - 0.5 * 32.0 * 0.01).abs() < 1e-5, "{value}");
     // The reference implementation's pair answers to a mere exposure with 20 × it, halved by the average of the two.
     let level = Tensor::<3>::full([1, H, W], 0.1, &Device::flex());

@@ -18,7 +18,7 @@ pub enum Preset {
     Tiny,
     /// As good as an hour on two cores can buy.
     Small,
-    /// The paper's sizes and the reference's optimisation (REFERENCE numbers throughout).
+    /// The paper's sizes and the reference implementation's optimisation.
     Paper,
 }
 

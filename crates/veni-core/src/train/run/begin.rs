@@ -26,7 +26,7 @@ impl Trainer {
     }
 
     /// A run that is yet to [`begin`](Self::begin): its data and the weights that it starts from are read, nothing is
-    /// written. `observer` is told how far reading the data has come.
+    /// written. The progress of reading the data is reported to `observer`.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the configuration does not fit; what reading data and weights says.
@@ -64,7 +64,7 @@ impl Trainer {
         self.make_folders()?;
         let checkpoint = self.checkpoint_path();
         if self.initialised.is_some() {
-            // to go on from here the model will not be needed again
+            // to resume from here the model will not be needed again
             checkpoint::save(&checkpoint, &self.optimiser.state(), &CheckpointInfo::new(0, None))?;
         } else if checkpoint.exists() {
             fs::remove_file(&checkpoint).map_err(|e| Error::io(&checkpoint, "remove", e))?;

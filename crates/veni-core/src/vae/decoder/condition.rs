@@ -77,9 +77,9 @@ impl Condition {
     /// Latents `[B, N, 3]` → `[B, N, 3]`: (a_0, a_1, z_z) of each vector, or (a_0, a_1, a_2).
     pub fn forward(&self, latent: Tensor<3>) -> Tensor<3> {
         let channels = self.w.dims()[0];
-        let turned = latent.clone().narrow(2, 0, channels);
+        let rotated = latent.clone().narrow(2, 0, channels);
         let scale: Tensor<3> = self.scale.val().unsqueeze();
-        let t = (turned.clone() * turned).sum_dim(2) * (scale.clone() * scale);
+        let t = (rotated.clone() * rotated).sum_dim(2) * (scale.clone() * scale);
         let alpha: Tensor<3> = self.linear.val().matmul(self.w.val()).unsqueeze();
         let beta: Tensor<3> = self.linear.val().matmul(self.u.val()).unsqueeze();
         let dropped = (alpha.clone() * beta.clone()).detach().lower_elem(0.0).float();

@@ -56,7 +56,7 @@ pub struct Layer {
 }
 
 impl Layer {
-    /// A layer of width `hidden` conditioned on 3N = `condition` numbers.
+    /// A layer of width `hidden` conditioned on D = 3N = `condition` features.
     pub fn new(condition: usize, hidden: usize, rng: &mut Stream, device: &Device) -> Self {
         Self {
             value: Linear::new(condition, hidden, rng, device),

@@ -157,8 +157,8 @@ impl Native {
 
 fn no_bfloat16() -> Error {
     Error::unsupported(
-        "decoder_by = kernels-bfloat16: this processor multiplies no bfloat16 (it lacks AVX512-BF16); take \
-         decoder_by = kernels",
+        "decoder_backend = kernels-bfloat16: this processor multiplies no bfloat16 (it lacks AVX512-BF16); take \
+         decoder_backend = kernels",
     )
 }
 

@@ -40,7 +40,7 @@ fn matrix(m: [[f32; 3]; 3], device: &Device) -> Tensor<2> {
 }
 
 #[test]
-fn turning_or_mirroring_the_latent_turns_or_mirrors_the_image() {
+fn rotating_or_mirroring_the_latent_rotates_or_mirrors_the_image() {
     let device = Device::flex();
     for form in FORMS {
         let decoder = decoder(form, &device);
@@ -49,9 +49,9 @@ fn turning_or_mirroring_the_latent_turns_or_mirrors_the_image() {
             let (s, c) = angle.sin_cos();
             for sign in [1.0, -1.0] {
                 let m = matrix([[c, s, 0.0], [-s * sign, c * sign, 0.0], [0.0, 0.0, 1.0]], &device);
-                let turned =
+                let rotated =
                     decoder.forward(rotate(latent(&device), m.clone()), directions(&device).matmul(m));
-                let difference = largest_difference(&expected, &turned);
+                let difference = largest_difference(&expected, &rotated);
                 assert!(difference < 1e-5, "{form:?}, angle {angle}, sign {sign}: {difference}");
             }
         }

@@ -15,7 +15,7 @@
 //!
 //! **A panorama has no edges, a network's image does.** Where the network takes any size, the image is continued beyond
 //! its own by at least 64 pixels, as the sphere goes on: round the sides, and over the poles half a turn away. Where the
-//! width is fixed, the network is run twice, the second time on the panorama turned by half, and the two are mixed by
+//! width is fixed, the network is run twice, the second time on the panorama rotated by half, and the two are mixed by
 //! sin² and cos² of the azimuth, so that neither's edge is seen. At another size than the panorama's own the network sees
 //! it resampled, and its radiance is resampled back; what is not clipped keeps its own resolution.
 

@@ -132,7 +132,7 @@ fn is_whole(bytes: &[u8]) -> bool {
 }
 
 /// Loads a checked network on a thread of its own, whose time is limited: what loading does depends on the network, and no
-/// check of ours foresees all of it. A thread that is not done goes on until the program ends.
+/// check here foresees all of it. A thread that is not done goes on until the program ends.
 fn load_in_time(bytes: Vec<u8>) -> Result<Model> {
     let (done, wait) = std::sync::mpsc::channel();
     let work = move || drop(done.send(Model::load(bytes)));

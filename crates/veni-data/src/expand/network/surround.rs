@@ -60,9 +60,10 @@ fn gather(panorama: &Panorama, origin: [isize; 2], [rows, columns]: [usize; 2]) 
     let mut planes = vec![0.0; 3 * rows * columns];
     for row in 0..rows {
         let around = (origin[1] + row as isize).rem_euclid(2 * height as isize) as usize;
-        let (from, turned) = if around < height { (around, 0) } else { (2 * height - 1 - around, width / 2) };
+        let (from, rotated) =
+            if around < height { (around, 0) } else { (2 * height - 1 - around, width / 2) };
         for column in 0..columns {
-            let at = (origin[0] + (column + turned) as isize).rem_euclid(width as isize) as usize;
+            let at = (origin[0] + (column + rotated) as isize).rem_euclid(width as isize) as usize;
             let pixel = panorama.pixel(at, from);
             for (c, v) in pixel.into_iter().enumerate() {
                 planes[(c * rows + row) * columns + column] = v;

@@ -58,7 +58,7 @@ fn sky(low: f32) -> LdrPanorama {
     LdrPanorama::new(grid, values.collect())
 }
 
-fn turned(ldr: &LdrPanorama, columns: usize) -> LdrPanorama {
+fn rotated(ldr: &LdrPanorama, columns: usize) -> LdrPanorama {
     let mut values = ldr.values().to_vec();
     values.chunks_exact_mut(ldr.grid().width).for_each(|row| row.rotate_left(columns));
     LdrPanorama::new(ldr.grid(), values)
@@ -138,13 +138,13 @@ fn logarithms_and_foreign_scales_become_radiance_in_units_of_white() {
     assert!(error.contains("scale") && error.contains("written.onnx"), "{error}");
 }
 
-/// How much it matters by how many columns a panorama was turned when `expand` saw it.
+/// How much it matters by how many columns a panorama was rotated when `expand` saw it.
 fn seam(expand: impl Fn(&LdrPanorama) -> Panorama) -> f32 {
     let ldr = sky(1.2);
     let straight = expand(&ldr);
     let mut worst = 0f32;
     for columns in [1, 5, 16] {
-        let mut there = expand(&turned(&ldr, columns));
+        let mut there = expand(&rotated(&ldr, columns));
         there.pixels_mut().chunks_exact_mut(GRID.width).for_each(|row| row.rotate_right(columns));
         let pairs = straight.pixels().iter().flatten().zip(there.pixels().iter().flatten());
         worst = pairs.fold(worst, |w, (a, b)| w.max((a - b).abs()));

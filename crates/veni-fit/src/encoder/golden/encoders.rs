@@ -128,7 +128,7 @@ pub(super) fn compute(case: &Case) -> Result<(), Skipped> {
 }
 
 #[test]
-fn encoders_of_the_authors() {
+fn encoders_of_the_reference() {
     let (passed, skipped) = run(&names(&["c03_", "c04_import_convention"]), compute);
     assert_eq!(passed.len(), 13, "{passed:#?} skipped: {skipped:#?}");
     assert!(skipped.is_empty(), "{skipped:#?}");

@@ -258,7 +258,7 @@ fn transformer(case: &Case, layer: VectorLayer) -> Result<(), Skipped> {
 }
 
 #[test]
-fn layers_of_the_authors() {
+fn layers_of_the_reference() {
     let (passed, skipped) = run(&names(&["c01_", "c02_"]), compute);
     assert_eq!(passed.len(), 22, "{passed:#?} skipped: {skipped:#?}");
     assert_eq!(skipped.len(), 6, "{skipped:#?}");
@@ -277,7 +277,7 @@ fn a_perturbed_weight_is_noticed() {
             let largest = values.iter().fold(1f32, |m, v| m.max(v.abs()));
             let middle = values.len() / 2;
             values[middle] += 1e-3 * largest;
-            compute(&case).expect("a layer of ours");
+            compute(&case).expect("a layer that is known");
             assert!(!super::failures(&case).is_empty(), "{name}: {key} does not matter");
         }
     }

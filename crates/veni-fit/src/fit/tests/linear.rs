@@ -47,7 +47,7 @@ fn what_a_light_has_is_what_light_says_of_it() {
 }
 
 #[test]
-fn the_gradient_is_the_slope_and_both_ways_to_it_agree() {
+fn the_gradient_is_the_difference_and_both_ways_to_it_agree() {
     let target = target(&lit(1));
     let at: Vec<f64> = radiance(&lit(2)).iter().map(|v| f64::from(*v)).collect();
     let (loss, gradient) = target.with_gradient(&at);
@@ -58,8 +58,12 @@ fn the_gradient_is_the_slope_and_both_ways_to_it_agree() {
             at[k] += step;
             target.with_gradient(&at).0
         };
-        let slope = (moved(1e-4) - moved(-1e-4)) / 2e-4;
-        assert!((slope - gradient[k]).abs() < 1e-6 * slope.abs() + 1e-12, "{k}: {slope} {}", gradient[k]);
+        let difference = (moved(1e-4) - moved(-1e-4)) / 2e-4;
+        assert!(
+            (difference - gradient[k]).abs() < 1e-6 * difference.abs() + 1e-12,
+            "{k}: {difference} {}",
+            gradient[k]
+        );
     }
     // through the decoder: the Jacobian of the moments, and a pass backward
     let (decoder, light) = (decoder(), lit(2));
@@ -80,14 +84,14 @@ fn the_gradient_is_the_slope_and_both_ways_to_it_agree() {
             }
             network.losses(&[light], &loss_of).unwrap()[0]
         };
-        let slope = (moved(2e-3) - moved(-2e-3)) / 4e-3;
-        assert!((slope - b).abs() < 2e-2 * scale, "{k}: {slope} {b}");
+        let difference = (moved(2e-3) - moved(-2e-3)) / 4e-3;
+        assert!((difference - b).abs() < 2e-2 * scale, "{k}: {difference} {b}");
     }
     // the exposure's column of J is light itself: its element of 2 Jᵀ J is twice Σ weight · light²
     let last = all.len() - 1;
     let dark: Vec<f64> = vec![-1e3; at.len()];
     let (wanted, found) = (target.with_gradient(&dark).0, equations.matrix[last * (last + 2)]);
-    // (light − wanted)² = light² − 2 light wanted + wanted², and the slope by the exposure is 2 light (light − wanted)
+    // (light − wanted)² = light² − 2 light wanted + wanted², and the derivative by the exposure is 2 light (light − wanted)
     let expected = 2.0 * (wanted - loss + equations.gradient[last]);
     assert!((found - expected).abs() < 1e-4 * expected, "{found} {expected}");
 }
@@ -186,7 +190,7 @@ fn what_is_no_light_is_refused() {
     said(empty().harmonics(&[[1.0; 3]]).unwrap().harmonics(&[[1.0; 3]]), &["once"]);
     let lit = |normal: [f32; 3], e: f64| empty().surfaces(&[(normal, Received::Illuminance(e))]);
     said(empty().surfaces(&[]), &["at least one"]);
-    said(lit([0.0; 3], 1.0), &["surface 0", "no direction"]);
+    said(lit([0.0; 3], 1.0), &["surface 0", "not a direction"]);
     said(lit(WAYS[0], -1.0), &["surface 0", "-1", "not negative"]);
     said(lit(WAYS[0], 0.0), &["all of the light is 0"]);
     said(lit(WAYS[0], 1.0).unwrap().surfaces(&[(WAYS[1], Received::Illuminance(1.0))]), &["once"]);

@@ -34,7 +34,7 @@ fn objectives() -> [Objective; 5] {
         Objective::LogError,
         Objective::LogAbsolute,
         Objective::Display { log: 0.01 },
-        Objective::Energy { share: 0.4 },
+        Objective::Energy { weight: 0.4 },
         Objective::ReferenceLogError,
     ]
 }
@@ -97,10 +97,10 @@ fn what_does_not_fit_together_is_refused() {
     assert!(message(&[&image], Some(&[&empty]), &[latent(1)]).contains("mask"));
 }
 
-/// One pixel with half of the light gets its area's part of 1 − share and half of the share; what a mask hides gets nothing,
-/// whatever stands there.
+/// One pixel with half of the light gets its area's part of 1 − weight and half of the weight; what a mask hides gets
+/// nothing, whatever stands there.
 #[test]
-fn light_deals_out_its_share_of_the_weight() {
+fn light_deals_out_its_part_of_the_weight() {
     let grid = Equirect::new(4, 2);
     let mut image = vec![0.0; 24];
     // eight pixels of one area, one of them hidden: six of radiance 1, and one of 6
@@ -109,20 +109,20 @@ fn light_deals_out_its_share_of_the_weight() {
     let mask: Vec<f32> = (0..8).map(|p| f32::from(p != 3)).collect();
     let (images, masks) = ([image.as_slice()], [mask.as_slice()]);
     let target = FitTarget::panoramas(grid, &images).unwrap().masked(&masks).unwrap();
-    let loss = |share: f64, which: &dyn Fn(usize) -> bool| -> f64 {
-        let loss = PixelLoss::new(Objective::Energy { share }, target.images()[0], &target.areas());
+    let loss = |weight: f64, which: &dyn Fn(usize) -> bool| -> f64 {
+        let loss = PixelLoss::new(Objective::Energy { weight }, target.images()[0], &target.areas());
         let off = |p: usize| [0, 1, 2].map(|c| f64::from(image[3 * p + c]) + 1e-3);
         (0..8).filter(|p| which(*p)).map(|p| 1e6 * loss.at(p, off(p)).loss).sum()
     };
-    for share in [0.0, 0.3, 1.0] {
-        assert!((loss(share, &|_| true) - 1.0).abs() < 1e-5, "a small error e everywhere is e²");
-        let expected = (1.0 - share) / 7.0 + 0.5 * share;
-        let found = loss(share, &|p| p == 1);
-        assert!((found - expected).abs() < 1e-5, "{share}: {found} instead of {expected}");
-        assert_eq!(loss(share, &|p| p == 3), 0.0);
+    for weight in [0.0, 0.3, 1.0] {
+        assert!((loss(weight, &|_| true) - 1.0).abs() < 1e-5, "a small error e everywhere is e²");
+        let expected = (1.0 - weight) / 7.0 + 0.5 * weight;
+        let found = loss(weight, &|p| p == 1);
+        assert!((found - expected).abs() < 1e-5, "{weight}: {found} instead of {expected}");
+        assert_eq!(loss(weight, &|p| p == 3), 0.0);
     }
     // what is far off is a line: twice as far costs twice as much, not four times
-    let all_light = PixelLoss::new(Objective::Energy { share: 1.0 }, target.images()[0], &target.areas());
+    let all_light = PixelLoss::new(Objective::Energy { weight: 1.0 }, target.images()[0], &target.areas());
     let cost = |e: f64| all_light.at(0, [e; 3]).loss;
     assert!((cost(200.0) / cost(100.0) - 2.0).abs() < 0.02);
 }
@@ -138,7 +138,7 @@ fn gradients_are_those_of_the_pixel_losses() {
         let loss = PixelLoss::new(*objective, target.images()[0], &target.areas());
         for pixel in 0..8 {
             let p = [0, 1, 2].map(|c| (1.3 * (3 * pixel + c) as f64).cos());
-            let PixelValue { gradient, curvature, .. } = loss.at(pixel, p);
+            let PixelValue { gradient, gauss_newton, .. } = loss.at(pixel, p);
             for c in 0..3 {
                 let moved = |step: f64| {
                     let mut q = p;
@@ -152,7 +152,8 @@ fn gradients_are_those_of_the_pixel_losses() {
                     continue;
                 }
                 // the parabola lies above an absolute error, and is a squared error itself
-                let parabola = |d: f64| loss.at(pixel, p).loss + gradient[c] * d + 0.5 * curvature[c] * d * d;
+                let parabola =
+                    |d: f64| loss.at(pixel, p).loss + gradient[c] * d + 0.5 * gauss_newton[c] * d * d;
                 for over in [-1.0, -0.1, 0.1, 1.0].map(|d| parabola(d) - moved(d)) {
                     match objective {
                         Objective::LogAbsolute => assert!(over > -1e-9, "{pixel}, {c}: {over}"),
@@ -236,8 +237,8 @@ fn settings_that_make_no_sense_are_refused_by_name() {
     };
     let light = FitConfig::light();
     assert!(message(&whole, FitConfig { prior: -1.0, ..light }).contains("prior = -1"));
-    let objective = Objective::Energy { share: 1.5 };
-    assert!(message(&whole, FitConfig { objective, ..light }).contains("share = 1.5"));
+    let objective = Objective::Energy { weight: 1.5 };
+    assert!(message(&whole, FitConfig { objective, ..light }).contains("weight = 1.5"));
     let rays = FitConfig { objective: Objective::CosineScaleInvariant, ..light };
     assert!(message(&whole, rays).contains("whole images"));
     let mut hole = image.clone();

@@ -4,7 +4,7 @@ use veni_light::sphere::{CubeFace, Equirect, Frame};
 
 use crate::shader::{Grid, Request};
 
-/// Native direction that pixel `index` of the whole grid is looked up at: the turn of the scene included.
+/// Native direction that pixel `index` of the whole grid is looked up at: the rotation of the scene included.
 ///
 /// # Panics
 /// If the grid is a list, whose directions are the host's.
@@ -22,15 +22,15 @@ pub fn direction_of(request: &Request, index: u32) -> [f32; 3] {
         }
         Grid::List { .. } => panic!("a list has no directions of its own"),
     };
-    turned(direction, -request.turn)
+    rotated(direction, -request.rotation)
 }
 
 /// A direction of a list, in the request's frame, made native.
 pub fn listed(request: &Request, direction: [f32; 3]) -> [f32; 3] {
-    turned(Frame::to_native(request.frame, direction), -request.turn)
+    rotated(Frame::to_native(request.frame, direction), -request.rotation)
 }
 
-fn turned([x, y, z]: [f32; 3], radians: f64) -> [f32; 3] {
+fn rotated([x, y, z]: [f32; 3], radians: f64) -> [f32; 3] {
     let (sin, cos) = radians.sin_cos();
     let (x, y) = (f64::from(x), f64::from(y));
     [(x * cos - y * sin) as f32, (x * sin + y * cos) as f32, z]

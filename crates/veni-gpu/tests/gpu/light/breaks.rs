@@ -25,7 +25,7 @@ fn mistakes_in_the_text() {
         ("select(-cosine, cosine, row == 0u)", "select(cosine, -cosine, row == 0u)"),
         ("0.5 - (f32(column)", "(f32(column)"),
         ("* place.at.y;\n        r =", "* place.at.x;\n        r ="),
-        // pixels that are looked for on the other side, and a turn the wrong way round
+        // pixels that are looked for on the other side, and a rotation the wrong way round
         ("VENI_LIGHT_PI - veni_light_atan2(d.y, d.x)", "VENI_LIGHT_PI + veni_light_atan2(d.y, d.x)"),
         ("angle += 0.25 * VENI_LIGHT_PI", "angle += 0.249 * VENI_LIGHT_PI"),
         ("d.x * t.y - d.y * t.x", "d.x * t.y + d.y * t.x"),

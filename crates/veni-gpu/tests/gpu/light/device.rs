@@ -13,28 +13,28 @@ use crate::util::plain;
 fn the_gpu_is_the_twin() {
     let Some(gpu) = plain() else { return };
     for sky in skies() {
-        for turn in [0.0, 0.7] {
-            let differs = differs(&gpu, &sky, &sky.packed(), &shader::light(), turn);
-            assert!(differs.is_none(), "{}, turned by {turn}: {differs:?}", sky.name);
+        for angle in [0.0, 0.7] {
+            let differs = differs(&gpu, &sky, &sky.packed(), &shader::light(), angle);
+            assert!(differs.is_none(), "{}, rotated by {angle}: {differs:?}", sky.name);
         }
     }
 }
 
-/// A turn by the uniform is `Sampler::turned` and `CompactLight::turned`, with no twin between.
+/// A rotation by the uniform is `Sampler::rotated` and `CompactLight::rotated`, with no twin between.
 #[test]
-fn a_turn_by_the_uniform_is_that_of_the_cpu() {
+fn a_rotation_by_the_uniform_is_that_of_the_cpu() {
     let Some(gpu) = plain() else { return };
     let sky = &skies()[0];
     let light = GpuLight::new(&gpu.opened.device, &sky.packed()).unwrap();
     let (pixels, us) = (sky.light.without_sun(), numbers(4096));
-    for turn in [1.0, -3.0] {
-        light.turn(&gpu.opened.queue, turn).unwrap();
+    for angle in [1.0, -3.0] {
+        light.rotate(&gpu.opened.queue, angle).unwrap();
         let found = run(&gpu, &light, &shader::light(), SAMPLE, &given(&us));
         let found: Vec<_> = found.iter().map(sampled).collect();
-        let cpu = Cpu::new(sky, &pixels, turn as f32);
+        let cpu = Cpu::new(sky, &pixels, angle as f32);
         assert!(others(&found, |k| cpu.sample(us[k])) <= FEW);
-        let unturned = Cpu::new(sky, &pixels, 0.0);
-        assert!(others(&found, |k| unturned.sample(us[k])) > 4000);
+        let unrotated = Cpu::new(sky, &pixels, 0.0);
+        assert!(others(&found, |k| unrotated.sample(us[k])) > 4000);
     }
 }
 
@@ -84,7 +84,7 @@ fn what_does_not_fit_is_named() {
     let (device, queue) = (&gpu.opened.device, &gpu.opened.queue);
     let mut packed = skies()[0].packed();
     let light = GpuLight::new(device, &packed).unwrap();
-    let refused = light.turn(queue, f64::NAN).unwrap_err().to_string();
+    let refused = light.rotate(queue, f64::NAN).unwrap_err().to_string();
     assert!(refused.contains("NaN"), "{refused}");
     // one texel more than WebGPU's default limit binds
     packed.texels = vec![[0.0; 4]; (1 << 23) + 1];

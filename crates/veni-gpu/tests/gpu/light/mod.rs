@@ -67,18 +67,18 @@ impl Sky {
     }
 }
 
-/// The CPU's sampler of a sky, turned.
+/// The CPU's sampler of a sky, rotated.
 enum Cpu<'a> {
     Split(SplitSampler<'a>),
     Map(Sampler<'a>),
 }
 
 impl<'a> Cpu<'a> {
-    fn new(sky: &Sky, pixels: &'a [[f32; 3]], turn: f32) -> Self {
-        let sampler = Sampler::new(EnvironmentMap::new(GRID, pixels).unwrap()).turned(turn);
+    fn new(sky: &Sky, pixels: &'a [[f32; 3]], angle: f32) -> Self {
+        let sampler = Sampler::new(EnvironmentMap::new(GRID, pixels).unwrap()).rotated(angle);
         let sampler = if sky.density == LightDensity::Compensated { sampler.compensated() } else { sampler };
         match sky.light.sun() {
-            Some(sun) => Self::Split(SplitSampler::new(sun.turned(f64::from(turn)), sampler)),
+            Some(sun) => Self::Split(SplitSampler::new(sun.rotated(f64::from(angle)), sampler)),
             None => Self::Map(sampler),
         }
     }
@@ -125,7 +125,7 @@ fn others(found: &[VeniLightSample], expected: impl Fn(usize) -> VeniLightSample
     found.iter().enumerate().filter(|(k, a)| differ((*k, a))).count()
 }
 
-/// Of 4096 samples so many may fall on the other side of a comparison of rounded numbers.
+/// How many of 4096 samples may fall on the other side of a comparison of rounded numbers.
 const FEW: usize = 4;
 
 /// Runs `body` for each input, which writes two vec4f; `text` is the functions'.
@@ -210,10 +210,10 @@ fn along(directions: &[[f32; 3]]) -> Vec<[f32; 4]> {
 }
 
 /// What differs between the GPU with this text and the twin, in the first sky; `None` if nothing does.
-fn differs(gpu: &Gpu, sky: &Sky, packed: &PackedLight, text: &str, turn: f64) -> Option<String> {
+fn differs(gpu: &Gpu, sky: &Sky, packed: &PackedLight, text: &str, angle: f64) -> Option<String> {
     let light = GpuLight::new(&gpu.opened.device, packed).unwrap();
-    light.turn(&gpu.opened.queue, turn).unwrap();
-    let twin = LightTwin::new(sky.packed()).turned(turn);
+    light.rotate(&gpu.opened.queue, angle).unwrap();
+    let twin = LightTwin::new(sky.packed()).rotated(angle);
     let us = numbers(4096);
     let places = run(gpu, &light, text, PLACE, &given(&us));
     let pixels =

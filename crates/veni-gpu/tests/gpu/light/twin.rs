@@ -11,21 +11,21 @@ use crate::util::{directions, say};
 fn the_twin_is_the_cpus_sampler() {
     for sky in skies() {
         let pixels = sky.light.without_sun();
-        for turn in [0.0, 0.7, -2.5] {
+        for angle in [0.0, 0.7, -2.5] {
             let (twin, cpu) =
-                (LightTwin::new(sky.packed()).turned(turn), Cpu::new(&sky, &pixels, turn as f32));
+                (LightTwin::new(sky.packed()).rotated(angle), Cpu::new(&sky, &pixels, angle as f32));
             let us = numbers(4096);
             let found: Vec<_> = us.iter().map(|u| twin.veni_sample_light(*u)).collect();
             let count = others(&found, |k| cpu.sample(us[k]));
-            assert!(count <= FEW, "{}, turned by {turn}: {count} samples differ", sky.name);
+            assert!(count <= FEW, "{}, rotated by {angle}: {count} samples differ", sky.name);
             // a direction on an edge between pixels may be found on either side
             let far = directions(2000)
                 .iter()
                 .filter(|d| relative(twin.veni_light_pdf(**d), cpu.pdf(**d)) > 1e-5)
                 .count();
-            assert!(far <= FEW, "{}, turned by {turn}: {far} densities differ", sky.name);
-            // and another turn is seen
-            let other = twin.turned(turn + 0.2);
+            assert!(far <= FEW, "{}, rotated by {angle}: {far} densities differ", sky.name);
+            // and another rotation is seen
+            let other = twin.rotated(angle + 0.2);
             assert!(sky.name == "black" || others(&found, |k| other.veni_sample_light(us[k])) > 3000);
         }
     }
@@ -34,20 +34,22 @@ fn the_twin_is_the_cpus_sampler() {
 #[test]
 fn the_twins_irradiance_is_that_of_lights_and_harmonics() {
     for sky in skies() {
-        let turned = sky.light.turned(0.7);
-        let (twin, sh) =
-            (LightTwin::new(sky.packed()).turned(0.7), sky.light.residual_sh().turned(0.7).irradiance());
+        let rotated = sky.light.rotated(0.7);
+        let (twin, sh) = (
+            LightTwin::new(sky.packed()).rotated(0.7),
+            sky.light.residual_sh().rotated_about_z(0.7).irradiance(),
+        );
         let (mut worst, mut off, mut whole) = (0f32, 0f64, 0f64);
         let scale = sky.light.mean().into_iter().fold(1e-6, f32::max) * std::f32::consts::PI;
         for n in directions(500) {
-            let lights = turned.lights().iter().fold([0.0; 3], |sum, light| {
+            let lights = rotated.lights().iter().fold([0.0; 3], |sum, light| {
                 let on = light.irradiance_on(n);
                 [0, 1, 2].map(|c| sum[c] + on[c])
             });
             let rest = sh.value(n).map(|v| (v as f32).max(0.0));
             let found = twin.veni_irradiance(n);
             worst = worst.max(apart(found, [0, 1, 2].map(|c| lights[c] + rest[c])) / scale);
-            let exact = turned.irradiance(n);
+            let exact = rotated.irradiance(n);
             for c in 0..3 {
                 off += f64::from(found[c] - exact[c]).powi(2);
                 whole += f64::from(exact[c]).powi(2);

@@ -50,7 +50,7 @@ pub(super) fn read(file: impl Read, path: &Path, options: &ReadOptions) -> Resul
     let sequence = Sequence::of(&data.primary_item)?;
     let size = sequence.size.map(|n| n as usize);
     let grid = options.check(size[0], size[1])?;
-    precheck::room(Some(sequence.size), options)?;
+    precheck::budget(Some(sequence.size), options)?;
     let properties = properties(&bytes);
     refuse_transformed(properties)?;
 

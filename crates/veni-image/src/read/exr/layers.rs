@@ -80,7 +80,7 @@ pub(super) fn choose(headers: &[Header], options: &ReadOptions) -> Result<Choice
         None if pictures.is_empty() => {
             let channels = headers.iter().flat_map(|h| h.channels.list.iter().map(|c| c.name.to_string()));
             let channels = channels.take(16).collect::<Vec<_>>().join(", ");
-            let vectors = if found.is_empty() { "" } else { " (vectors are no pictures)" };
+            let vectors = if found.is_empty() { "" } else { " (vectors are not pictures)" };
             Err(Error::unsupported(format!(
                 "no R, G, B or Y channels of a picture among: {channels}{vectors}"
             )))

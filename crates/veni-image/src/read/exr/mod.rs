@@ -30,7 +30,7 @@ pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -
     let header = reader.headers()[choice.part].clone();
     let grid = judge(&header, options)?;
     // the decoder's own view of the header: a damaged one may be walked through otherwise before
-    precheck::room(Some([grid.width as u64, grid.height as u64]), options)?;
+    precheck::budget(Some([grid.width as u64, grid.height as u64]), options)?;
     let attributes = text(&header);
     let meaning =
         if options.data { Meaning::linear() } else { tags::meaning(&header, &attributes, choice.coloured)? };

@@ -33,7 +33,7 @@ pub(super) fn meaning(header: &Header, text: &BTreeMap<String, String>, coloured
                 }
             }
             None if id == "data" => {
-                return Err(Error::unsupported("colorInteropID = data: its numbers are no colours"));
+                return Err(Error::unsupported("colorInteropID = data: its values are not colours"));
             }
             None if id == "unknown" => {
                 meaning.note(

@@ -8,7 +8,7 @@ use super::rows::Layout;
 use super::wrap;
 use crate::{Error, Result};
 
-/// Bytes of a header, and of one of its lines; histories of commands take some thousands, a latent of 300 numbers 4,000.
+/// Bytes of a header, and of one of its lines; histories of commands take some thousands, a latent of dimension 300 4,000.
 const LARGEST: u64 = 1 << 24;
 
 /// What the header says.

@@ -52,7 +52,7 @@ pub(super) fn peak(size: Size, each: u64, options: &ReadOptions) -> Option<u64> 
 
 /// # Errors
 /// [`Error::TooLarge`] if the memory does not hold what reading a file of this size takes.
-pub(super) fn room(size: Size, options: &ReadOptions) -> Result<()> {
+pub(super) fn budget(size: Size, options: &ReadOptions) -> Result<()> {
     peak(size, READ_BYTES_PER_PIXEL, options).map_or(Ok(()), memory::check)
 }
 

@@ -1,4 +1,4 @@
-//! The steps of a layer that are no matrix product, forward and backward, over blocks. MODEL (38).
+//! The steps of a layer that are not matrix products, forward and backward, over blocks. MODEL (38).
 
 use std::f32::consts::TAU;
 
@@ -120,8 +120,8 @@ pub(super) fn unencode<S: Simd>(
         inputs.zip(features).zip(gradient)
     {
         for v in 0..VECTORS {
-            let one = turn(simd, [g_sin1[v], g_cos1[v]], [sin1[v], cos1[v]]);
-            let four = turn(simd, [g_sin4[v], g_cos4[v]], [sin4[v], cos4[v]]);
+            let one = by_angle(simd, [g_sin1[v], g_cos1[v]], [sin1[v], cos1[v]]);
+            let four = by_angle(simd, [g_sin4[v], g_cos4[v]], [sin4[v], cos4[v]]);
             each(j, v, simd.mul_add_e_f32s(one, slow, simd.mul_add_e_f32s(four, fast, g[v])));
         }
     }
@@ -129,6 +129,6 @@ pub(super) fn unencode<S: Simd>(
 
 /// Backward of (sin a, cos a), by a.
 #[inline(always)]
-fn turn<S: Simd>(simd: S, [g_sin, g_cos]: [S::f32s; 2], [sin, cos]: [S::f32s; 2]) -> S::f32s {
+fn by_angle<S: Simd>(simd: S, [g_sin, g_cos]: [S::f32s; 2], [sin, cos]: [S::f32s; 2]) -> S::f32s {
     simd.sub_f32s(simd.mul_f32s(g_sin, cos), simd.mul_f32s(g_cos, sin))
 }

@@ -95,22 +95,23 @@ fn a_wrong_sign_in_the_target_is_seen() {
 }
 
 #[test]
-fn at_latent_zero_everything_is_finite_and_turning_turns_the_gradient() {
+fn at_latent_zero_everything_is_finite_and_rotating_rotates_the_gradient() {
     let model = odd(3, 16, VnReluForm::Reference);
     let directions = directions(100);
     let zero = gradient(&model, &Latent::new(vec![[0.0; 3]; 3]), &directions);
     assert!(zero.vectors.as_flattened().iter().all(|v| v.is_finite()));
 
     let latent = Latent::from_seed(&Prior::standard(3), 5);
-    let turn = |[x, y, z]: [f32; 3]| {
+    let rotate = |[x, y, z]: [f32; 3]| {
         let (sin, cos) = 0.8f32.sin_cos();
         [x * cos - y * sin, x * sin + y * cos, z]
     };
-    let turned: Vec<_> = directions.iter().map(|d| turn(*d)).collect();
-    let (one, two) = (gradient(&model, &latent, &directions), gradient(&model, &latent.turned(0.8), &turned));
+    let rotated: Vec<_> = directions.iter().map(|d| rotate(*d)).collect();
+    let (one, two) =
+        (gradient(&model, &latent, &directions), gradient(&model, &latent.rotated(0.8), &rotated));
     let scale = one.vectors.as_flattened().iter().fold(0.0f32, |m, v| m.max(v.abs()));
     for (a, b) in one.vectors.iter().zip(&two.vectors) {
-        let a = turn(*a);
+        let a = rotate(*a);
         assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-4 * scale), "{a:?} {b:?}");
     }
 }

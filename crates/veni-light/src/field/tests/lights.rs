@@ -126,14 +126,14 @@ fn baked_lights_have_their_energy_at_any_size() {
 }
 
 #[test]
-fn the_whole_code_turns_with_the_scene() {
+fn the_whole_code_rotates_with_the_scene() {
     let latent = Latent { lights: lights(), lobes: lobes(), ..plain() };
     let (grid, columns) = (Equirect::new(96, 48), 7);
     let angle = std::f64::consts::TAU * f64::from(columns) / 96.0;
     let still = field(&latent).bake(grid);
-    for turned in [field(&latent.turned(angle)), field(&latent).turned(angle)] {
-        let turned = turned.bake(grid);
-        for (row, still) in turned.chunks_exact(96).zip(still.chunks_exact(96)) {
+    for rotated in [field(&latent.rotated(angle)), field(&latent).rotated(angle)] {
+        let rotated = rotated.bake(grid);
+        for (row, still) in rotated.chunks_exact(96).zip(still.chunks_exact(96)) {
             for (i, pixel) in row.iter().enumerate() {
                 // azimuth grows to the left
                 let from = still[(i + columns as usize) % 96];

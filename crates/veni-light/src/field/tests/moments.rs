@@ -1,6 +1,6 @@
 //! Moments of radiance against sums and differences of the plain f64 network.
 
-use super::normal::{apart, at, slopes};
+use super::normal::{apart, at, jacobian};
 use super::reference::Plain;
 use super::*;
 use crate::field::Moments;
@@ -11,11 +11,11 @@ fn weights(directions: usize, count: usize) -> Vec<f32> {
     (0..directions * count).map(weight).collect()
 }
 
-/// Where the plain network has slopes, the moments in these directions and their slopes.
+/// Where the plain network has a derivative, the moments in these directions and their Jacobian.
 fn expected(model: &Model, n: usize, count: usize, directions: &[[f32; 3]]) -> (Vec<[f32; 3]>, Moments) {
     let (plain, latent, unknowns) = (Plain(model), at(n), 3 * n + 1);
     let found: Vec<_> =
-        directions.iter().filter_map(|d| slopes(&plain, &latent, *d).map(|rows| (*d, rows))).collect();
+        directions.iter().filter_map(|d| jacobian(&plain, &latent, *d).map(|rows| (*d, rows))).collect();
     assert!(2 * found.len() > directions.len(), "{} of {} directions", found.len(), directions.len());
     let weights = weights(found.len(), count);
     let (mut values, mut jacobian) = (vec![[0.0; 3]; count], vec![0.0; 3 * count * unknowns]);
@@ -45,8 +45,8 @@ fn sums_and_differences_of_the_plain_network_agree() {
         let (directions, expected) = expected(model, n, count, &super::directions(directions));
         let found = found(model, n, count, &directions);
         let values = apart(found.values.as_flattened(), expected.values.as_flattened());
-        let slopes = apart(&found.jacobian, &expected.jacobian);
-        assert!(values < 1e-5 && slopes < 3e-4, "{n} vectors, {count} sums: {values}, {slopes}");
+        let derivatives = apart(&found.jacobian, &expected.jacobian);
+        assert!(values < 1e-5 && derivatives < 3e-4, "{n} vectors, {count} sums: {values}, {derivatives}");
         // a weight that is not looked at, or a colour in another's place, would be seen
         let mut wrong = found.jacobian.clone();
         wrong.swap(0, 3 * n + 1);

@@ -22,7 +22,7 @@ fn found(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> NormalEquat
 
 /// ∂P/∂(latent) in a direction by central differences of the plain network, exposure last; nothing where a difference crosses
 /// the kink of a ReLU.
-pub(super) fn slopes(plain: &Plain<'_>, latent: &Latent, d: [f32; 3]) -> Option<Vec<[f64; 3]>> {
+pub(super) fn jacobian(plain: &Plain<'_>, latent: &Latent, d: [f32; 3]) -> Option<Vec<[f64; 3]>> {
     let moved = |k: usize, step: f32| {
         let mut moved = latent.clone();
         let at = match moved.vectors.as_flattened_mut().get_mut(k) {
@@ -47,12 +47,12 @@ pub(super) fn slopes(plain: &Plain<'_>, latent: &Latent, d: [f32; 3]) -> Option<
     (0..=3 * latent.vectors.len()).map(row).collect()
 }
 
-/// Jᵀ diag(ℓ″) J with J by [`slopes`], row-major; and the directions it is of, those of `directions` that have them.
+/// Jᵀ diag(ℓ″) J with J by [`jacobian`], row-major; and the directions it is of, those of `directions` that have them.
 fn expected(model: &Model, latent: &Latent, directions: &[[f32; 3]]) -> (Vec<[f32; 3]>, Vec<f64>) {
     let (plain, unknowns) = (Plain(model), 3 * latent.vectors.len() + 1);
     let (mut kept, mut matrix) = (Vec::new(), vec![0.0; unknowns * unknowns]);
     for d in directions {
-        let Some(rows) = slopes(&plain, latent, *d) else { continue };
+        let Some(rows) = jacobian(&plain, latent, *d) else { continue };
         let weight = loss(kept.len(), [0.0; 3]).weight.map(f64::from);
         kept.push(*d);
         for (j, a) in rows.iter().enumerate() {
@@ -107,9 +107,9 @@ fn the_gradient_is_that_of_the_other_kernel_and_a_wrong_matrix_is_seen() {
     assert!((equations.loss - gradient.loss).abs() < 1e-6 * gradient.loss);
     // symmetric, and not what it is at another latent or with a sign changed
     let unknowns = flat.len();
-    let turned: Vec<f64> =
+    let transposed: Vec<f64> =
         (0..unknowns * unknowns).map(|k| equations.matrix[k % unknowns * unknowns + k / unknowns]).collect();
-    assert!(apart(&equations.matrix, &turned) < 1e-5);
+    assert!(apart(&equations.matrix, &transposed) < 1e-5);
     let (few, truth) = expected(&model, &at(3), &directions[..70]);
     let mut wrong = found(&model, &at(3), &few).matrix;
     assert!(apart(&wrong, &truth) < 1e-3);

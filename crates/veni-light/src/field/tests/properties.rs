@@ -10,16 +10,16 @@ fn log(field: &crate::field::Field, directions: &[[f32; 3]]) -> Vec<[f32; 3]> {
     out
 }
 
-/// Turning the latent and turning the directions are the same to 1e-5 in log radiance.
+/// Rotating the latent and rotating the directions are the same to 1e-5 in log radiance.
 #[test]
-fn turning_the_latent_turns_the_sky() {
+fn rotating_the_latent_rotates_the_sky() {
     let directions = directions(500);
     for n in [9, 100] {
         let (decoder, latent) = (filler(n).decoder().unwrap(), Latent::from_seed(&Prior::standard(n), 5));
         let still = decoder.condition(&latent).unwrap();
         for angle in [0.1, 1.0, 2.5, -3.0, 100.0f64] {
             let (sin, cos) = angle.sin_cos();
-            let turned: Vec<_> = directions
+            let rotated: Vec<_> = directions
                 .iter()
                 .map(|d| {
                     let [x, y] = [f64::from(d[0]), f64::from(d[1])];
@@ -27,16 +27,16 @@ fn turning_the_latent_turns_the_sky() {
                 })
                 .collect();
             let expected = log(&still, &directions);
-            let by_latent = log(&decoder.condition(&latent.turned(angle)).unwrap(), &turned);
+            let by_latent = log(&decoder.condition(&latent.rotated(angle)).unwrap(), &rotated);
             assert!(
                 distance(&by_latent, &expected) <= 1e-5,
                 "{n}, {angle}: {:e}",
                 distance(&by_latent, &expected)
             );
-            let by_field = log(&still.turned(angle), &turned);
+            let by_field = log(&still.rotated(angle), &rotated);
             assert!(distance(&by_field, &expected) <= 1e-5);
-            // and a wrong sense of turning would be seen
-            assert!(distance(&log(&still.turned(-angle), &turned), &expected) > 1e-2);
+            // and a wrong sense of rotation would be seen
+            assert!(distance(&log(&still.rotated(-angle), &rotated), &expected) > 1e-2);
         }
         let mirrored: Vec<_> = directions.iter().map(|[x, y, z]| [*x, -y, *z]).collect();
         let reflected = log(&decoder.condition(&latent.mirrored()).unwrap(), &mirrored);
@@ -45,15 +45,15 @@ fn turning_the_latent_turns_the_sky() {
     }
 }
 
-/// A quarter turn of the field moves the baked columns by a quarter of the width.
+/// A rotation of the field by 90° moves the baked columns by a quarter of the width.
 #[test]
-fn turned_bake_is_a_column_shift() {
+fn rotated_bake_is_a_column_shift() {
     let field = filler(9).decoder().unwrap().condition(&Latent::from_seed(&Prior::standard(9), 2)).unwrap();
     let grid = Equirect::new(32, 16);
-    let (still, turned) = (field.bake(grid), field.turned(std::f64::consts::FRAC_PI_2).bake(grid));
-    for (a, b) in still.chunks(32).zip(turned.chunks(32)) {
+    let (still, rotated) = (field.bake(grid), field.rotated(std::f64::consts::FRAC_PI_2).bake(grid));
+    for (a, b) in still.chunks(32).zip(rotated.chunks(32)) {
         for column in 0..32 {
-            // azimuth grows to the left, so turning by +90° moves the picture left
+            // azimuth grows to the left, so rotating by +90° moves the picture left
             let (a, b) = (a[(column + 8) % 32], b[column]);
             assert!((0..3).all(|k| (a[k] / b[k] - 1.0).abs() < 1e-5), "{a:?} {b:?}");
         }

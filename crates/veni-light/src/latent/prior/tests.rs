@@ -1,7 +1,7 @@
 use super::*;
 use crate::random::Stream;
 
-/// Codes with known statistics: c₁ = r·e^{iα} turned by a random angle, c₂ = i c₁/2 + noise, z = (3, −1) ± .
+/// Codes with known statistics: c₁ = r·e^{iα} rotated by a random angle, c₂ = i c₁/2 + noise, z = (3, −1) ± .
 fn codes(count: usize, seed: u64) -> Vec<Latent> {
     let rng = &mut Stream::from_seed(seed);
     let mut code = || {
@@ -55,13 +55,13 @@ fn samples_have_the_fitted_statistics() {
     assert!((moments(&samples)[2] - 3.0).abs() < 0.06, "posterior variance is not added");
 }
 
-/// Turning the training codes, each by its own angle or all by one, leaves the fit as it is.
+/// Rotating the training codes, each by its own angle or all by one, leaves the fit as it is.
 #[test]
-fn fit_is_invariant_under_turning() {
+fn fit_is_invariant_under_rotation() {
     let codes = codes(500, 3);
     let prior = Prior::fit(&codes, None).unwrap();
-    let turned: Vec<_> = codes.iter().enumerate().map(|(i, code)| code.turned(i as f64)).collect();
-    let other = Prior::fit(&turned, None).unwrap();
+    let rotated: Vec<_> = codes.iter().enumerate().map(|(i, code)| code.rotated(i as f64)).collect();
+    let other = Prior::fit(&rotated, None).unwrap();
     for (a, b) in [(&prior.xy_real, &other.xy_real), (&prior.xy_imaginary, &other.xy_imaginary)] {
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6));
     }

@@ -65,7 +65,7 @@ fn what_was_drawn_is_learned() {
 #[test]
 fn turning_the_codes_turns_the_suns_and_changes_no_fit() {
     let codes = drawn(300);
-    let turned: Vec<_> = codes.iter().enumerate().map(|(i, code)| code.turned(i as f64)).collect();
+    let turned: Vec<_> = codes.iter().enumerate().map(|(i, code)| code.rotated(i as f64)).collect();
     let (a, b) = [&codes, &turned].map(|codes| SunPrior::fit(codes, &Prior::standard(N)).unwrap()).into();
     assert!(a.azimuth.as_flattened().iter().zip(b.azimuth.as_flattened()).all(|(a, b)| (a - b).abs() < 1e-5));
     assert_eq!((a.weights, a.presence), (b.weights, b.presence));

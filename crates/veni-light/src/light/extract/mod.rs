@@ -54,9 +54,9 @@ pub enum SunChoice {
 /// What is taken for a light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Criteria {
-    /// So many are looked for.
+    /// The number that is looked for.
     pub(super) most: usize,
-    /// So many are kept, the sun first; the others are put back.
+    /// The number that is kept, the sun first; the others are put back.
     pub(super) keep: usize,
     /// Those of a larger angular radius are put back too, radians.
     pub(super) widest: f32,

@@ -24,7 +24,7 @@ const LOW: f32 = 0.173_648;
 const DARK_SKY: f64 = 0.06;
 /// It is night's if it is also so much darker than the ground, which lamps light and the sky does not.
 const DARK: f64 = 0.15;
-/// So many lights of nearly the same strength are lamps.
+/// This many lights of nearly the same strength are lamps.
 const LAMPS: usize = 3;
 
 /// Luminance of parts of what is left.

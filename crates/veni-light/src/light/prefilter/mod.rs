@@ -90,7 +90,7 @@ impl<'a> Prefilter<'a> {
         self.lights.iter().fold(rest, |sum, light| [0, 1, 2].map(|c| sum[c] + f64::from(light.irradiance[c])))
     }
 
-    /// All levels of a chain; `done` is told after each.
+    /// All levels of a chain; Each is reported to `done`.
     pub fn specular(&self, levels: Levels, axes: CubeAxes, mut done: impl FnMut(usize)) -> Vec<CubeMap> {
         (0..levels.count())
             .map(|k| {
@@ -116,7 +116,7 @@ impl<'a> Prefilter<'a> {
 /// # Panics
 /// Unless `p` is in (0, 1].
 pub fn lobe_gains(p: f64, degree: usize) -> Vec<f64> {
-    assert!(p > 0.0 && p <= 1.0, "a level of roughness {p} is no convolution");
+    assert!(p > 0.0 && p <= 1.0, "a level of roughness {p} is not a convolution");
     Lobe::new(p * p).gains(degree, TOLERANCE)
 }
 

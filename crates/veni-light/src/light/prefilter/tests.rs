@@ -142,7 +142,7 @@ fn levels_are_the_sum_over_all_pixels() {
             // a lobe that is half a texel off is noticed
             if k == 0 {
                 let mut moved = prefilter.clone();
-                let shifted = light.turned((1.0 / levels.size(level) as f64).max(0.02));
+                let shifted = light.rotated((1.0 / levels.size(level) as f64).max(0.02));
                 moved.lights = vec![shifted];
                 let cube = moved.level(p, levels.size(level), CubeAxes::BEVY);
                 let mut sums = (0.0, 0.0);
@@ -199,22 +199,22 @@ fn energy_is_that_of_the_input() {
     }
 }
 
-/// LIGHT 3.4 (7): a turned map and a turned spectrum give the same levels.
+/// LIGHT 3.4 (7): a rotated map and a rotated spectrum give the same levels.
 #[test]
-fn a_turn_commutes_with_the_filter() {
+fn a_rotation_commutes_with_the_filter() {
     let grid = Equirect::new(128, 64);
     let light = sun([0.48, -0.6, 0.64]);
     let pixels = sky(grid, light.direction);
-    let turned: Vec<[f32; 3]> =
+    let rotated: Vec<[f32; 3]> =
         (0..grid.len()).map(|k| pixels[k / 128 * 128 + (k % 128 + 32) % 128]).collect();
     let levels = Levels::down_to(32, 8, Law::Quadratic);
     let bake = |pixels: &[[f32; 3]], light| {
         let map = EnvironmentMap::new(grid, pixels).unwrap();
         Prefilter::new(map, &[levels]).with_lights(&[light]).level(0.5, 16, CubeAxes::NATIVE)
     };
-    let (a, b) = (bake(&turned, light.turned(std::f64::consts::FRAC_PI_2)), bake(&pixels, light));
+    let (a, b) = (bake(&rotated, light.rotated(std::f64::consts::FRAC_PI_2)), bake(&pixels, light));
     for (k, texel) in a.texels().iter().enumerate() {
-        // seen after a quarter turn back
+        // seen after a rotation back by 90°
         let [x, y, z] = direction(16, CubeAxes::NATIVE, k);
         let before = b.texels()[CubeMap::index(16, CubeAxes::NATIVE, [y, -x, z])];
         for (p, q) in texel.iter().zip(before) {

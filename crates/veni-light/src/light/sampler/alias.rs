@@ -77,7 +77,7 @@ impl Alias {
     }
 }
 
-/// So many numbers of [0, 1) a random f32 tells apart.
+/// The number of values in [0, 1) that a random f32 tells apart.
 const BITS: usize = 1 << 24;
 /// The largest f32 below 1.
 pub(super) const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;

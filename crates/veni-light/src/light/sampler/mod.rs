@@ -46,8 +46,8 @@ pub struct Sampler<'a> {
     scale: f32,
     floor: f32,
     even: f32,
-    /// Sine and cosine of the turn.
-    turn: [f32; 2],
+    /// Sine and cosine of the rotation.
+    rotation: [f32; 2],
 }
 
 /// A direction and what is known of it.
@@ -75,10 +75,10 @@ impl<'a> Sampler<'a> {
     pub fn compensated(&self) -> Self {
         let map = self.map.map();
         let mean = map.integral().map(|s| (s / (4.0 * std::f64::consts::PI)) as f32);
-        Self::above(self.map.clone(), luminance(mean), self.turn)
+        Self::above(self.map.clone(), luminance(mean), self.rotation)
     }
 
-    fn above(map: Reduced<'a>, floor: f32, turn: [f32; 2]) -> Self {
+    fn above(map: Reduced<'a>, floor: f32, rotation: [f32; 2]) -> Self {
         let view = map.map();
         let grid = view.grid();
         let above = |pixel: &[f32; 3]| (luminance(*pixel) - floor).max(0.0);
@@ -97,14 +97,14 @@ impl<'a> Sampler<'a> {
             (0..=grid.height).map(|j| (std::f64::consts::PI * j as f64 / grid.height as f64).cos() as f32);
         let cap = (0.5 * std::f64::consts::PI / grid.height as f64).sin().powi(2) as f32;
         let heights = heights.collect();
-        Self { alias: Alias::new(&weights), heights, cap, scale, floor, even, turn, map }
+        Self { alias: Alias::new(&weights), heights, cap, scale, floor, even, rotation, map }
     }
 
-    /// The same of the map turned by `angle` radians about z, counter-clockwise seen from above. Nothing is computed again.
+    /// The same of the map rotated by `angle` radians about z, counter-clockwise seen from above. Nothing is computed again.
     #[must_use]
-    pub fn turned(&self, angle: f32) -> Self {
-        let ([s, c], (sin, cos)) = (self.turn, angle.sin_cos());
-        Self { turn: [s * cos + c * sin, c * cos - s * sin], ..self.clone() }
+    pub fn rotated(&self, angle: f32) -> Self {
+        let ([s, c], (sin, cos)) = (self.rotation, angle.sin_cos());
+        Self { rotation: [s * cos + c * sin, c * cos - s * sin], ..self.clone() }
     }
 
     /// The pixel that two numbers of [0, 1) choose, and the place in it, each coordinate in (0, 1).
@@ -135,7 +135,7 @@ impl<'a> Sampler<'a> {
             ((1.0 - z * z).max(0.0).sqrt(), z)
         };
         let (s, c) = (PI - TAU * (column as f32 + x) / grid.width as f32).sin_cos();
-        let [ts, tc] = self.turn;
+        let [ts, tc] = self.rotation;
         let direction = [sin * (c * tc - s * ts), sin * (s * tc + c * ts), cos];
         let radiance = view.pixels()[pixel];
         Sample { direction, radiance, pdf: self.density(radiance) }
@@ -152,7 +152,7 @@ impl<'a> Sampler<'a> {
     pub fn radiance(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let view = self.map.map();
         let Equirect { width, height } = view.grid();
-        let [s, c] = self.turn;
+        let [s, c] = self.rotation;
         let [column, row] = pixel(view.grid(), [x * c + y * s, y * c - x * s, z]);
         let (row, column) = ((row as usize).min(height - 1), (column as usize).min(width - 1));
         view.pixels()[row * width + column]
@@ -164,7 +164,7 @@ impl<'a> Sampler<'a> {
         self.scale * (luminance(radiance) - self.floor).max(0.0) + self.even
     }
 
-    /// The map whose pixels are drawn, before any turn: means where it had more than 2²³.
+    /// The map whose pixels are drawn, before any rotation: means where it had more than 2²³.
     pub fn map(&self) -> EnvironmentMap<'_> {
         self.map.map()
     }

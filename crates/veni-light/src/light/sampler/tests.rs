@@ -33,7 +33,7 @@ fn draws_follow_the_density() {
     let pixels = sky(grid());
     let map = EnvironmentMap::new(grid(), &pixels).unwrap();
     let plain = Sampler::new(map);
-    for sampler in [plain.clone(), plain.compensated(), plain.turned(1.0)] {
+    for sampler in [plain.clone(), plain.compensated(), plain.rotated(1.0)] {
         for seed in 0..5 {
             let (draws, cells) = (400_000, 24 * 12);
             let mut next = numbers(seed);
@@ -103,7 +103,7 @@ fn densities_integrate_to_one_and_agree() {
             .map(|k| grid().solid_angle(k / PIXELS[0]) * f64::from(sampler.density(pixels[k])))
             .sum();
         assert!((whole - 1.0).abs() < 1e-6, "{whole}");
-        for sampler in [sampler.clone(), sampler.turned(-2.0)] {
+        for sampler in [sampler.clone(), sampler.rotated(-2.0)] {
             let mut next = numbers(9);
             for _ in 0..20_000 {
                 let u = next();
@@ -116,8 +116,8 @@ fn densities_integrate_to_one_and_agree() {
             }
         }
     }
-    // a wrong pixel is noticed: a density turned against its samples
-    let (sampler, other) = (plain.clone(), plain.turned(0.2));
+    // a wrong pixel is noticed: a density rotated against its samples
+    let (sampler, other) = (plain.clone(), plain.rotated(0.2));
     let mut next = numbers(9);
     let misses = (0..1000).filter(|_| {
         let sample = sampler.sample(next());
@@ -127,14 +127,14 @@ fn densities_integrate_to_one_and_agree() {
 }
 
 #[test]
-fn a_turn_turns_samples() {
+fn a_rotation_rotates_samples() {
     let pixels = sky(grid());
     let sampler = Sampler::new(EnvironmentMap::new(grid(), &pixels).unwrap());
-    let turned = sampler.turned(0.7);
+    let rotated = sampler.rotated(0.7);
     let mut next = numbers(3);
     for _ in 0..1000 {
         let u = next();
-        let ([x, y, z], b) = (sampler.sample(u).direction, turned.sample(u));
+        let ([x, y, z], b) = (sampler.sample(u).direction, rotated.sample(u));
         let (s, c) = 0.7f32.sin_cos();
         for (p, q) in [c * x - s * y, s * x + c * y, z].into_iter().zip(b.direction) {
             assert!((p - q).abs() < 1e-6);

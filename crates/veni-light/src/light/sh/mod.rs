@@ -1,5 +1,5 @@
-//! Real spherical harmonics of light: projected with exact pixel areas, turned exactly, made into irradiance, written as engines
-//! read them. LIGHT (10) to (15).
+//! Real spherical harmonics of light: projected with exact pixel areas, rotated exactly, made into irradiance, written
+//! as engines read them. LIGHT (10) to (15).
 
 mod basis;
 mod convention;

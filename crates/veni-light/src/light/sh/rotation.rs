@@ -1,4 +1,5 @@
-//! Turns: about z by phases, by any rotation through a quadrature that is exact for the bands there are. LIGHT (12), (13).
+//! Rotations: about z by phases, by any rotation through a quadrature that is exact for the bands there are.
+//! LIGHT (12), (13).
 
 use std::f64::consts::PI;
 
@@ -6,9 +7,10 @@ use super::{Basis, Sh};
 use crate::light::quadrature::gauss_legendre;
 
 impl<const L: usize> Sh<L> {
-    /// The same light turned by `angle` radians about z, counter-clockwise seen from above: the pair (c_lm, c_l−m) turns by mα.
+    /// The same light rotated by `angle` radians about z, counter-clockwise seen from above: the pair (c_lm, c_l−m)
+    /// turns by mα.
     #[must_use]
-    pub fn turned(&self, angle: f64) -> Self {
+    pub fn rotated_about_z(&self, angle: f64) -> Self {
         let mut out = self.clone();
         for l in 0..=L {
             for m in 1..=l {

@@ -169,19 +169,23 @@ fn conventions_agree_on_the_irradiance() {
 }
 
 #[test]
-fn turns_are_those_of_the_picture() {
+fn rotations_are_those_of_the_picture() {
     let pixels = sky();
     let sh = Sh::<8>::of(EnvironmentMap::new(GRID, &pixels).unwrap());
     // 37 columns
     let angle = 2.0 * PI * 37.0 / 256.0;
-    let mut turned = pixels.clone();
-    for (row, before) in turned.chunks_exact_mut(256).zip(pixels.chunks_exact(256)) {
+    let mut rotated = pixels.clone();
+    for (row, before) in rotated.chunks_exact_mut(256).zip(pixels.chunks_exact(256)) {
         row.copy_from_slice(before);
         row.rotate_left(37);
     }
-    let expected = Sh::<8>::of(EnvironmentMap::new(GRID, &turned).unwrap());
-    assert!(near(&sh.turned(angle), &expected) < 1e-6, "{}", near(&sh.turned(angle), &expected));
-    assert!(near(&sh.turned(-angle), &expected) > 0.01, "the wrong way round must not pass");
+    let expected = Sh::<8>::of(EnvironmentMap::new(GRID, &rotated).unwrap());
+    assert!(
+        near(&sh.rotated_about_z(angle), &expected) < 1e-6,
+        "{}",
+        near(&sh.rotated_about_z(angle), &expected)
+    );
+    assert!(near(&sh.rotated_about_z(-angle), &expected) > 0.01, "the wrong way round must not pass");
     // the same as a matrix, and a tilt there and back
     let (s, c) = (angle.sin() as f32, angle.cos() as f32);
     let matrix = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]];
@@ -267,7 +271,7 @@ mod of_a_field {
     use crate::model::Model;
 
     /// Against central differences: the gradient of Σ ∂ c along a direction in the latent.
-    fn slopes(value: impl Fn(&Latent) -> f64, latent: &Latent, gradient: &[[f32; 3]]) -> (f64, f64) {
+    fn derivatives(value: impl Fn(&Latent) -> f64, latent: &Latent, gradient: &[[f32; 3]]) -> (f64, f64) {
         let step = 2e-3;
         let way: Vec<[f32; 3]> = (0..latent.vectors.len())
             .map(|k| [0, 1, 2].map(|c| ((7 * k + 3 * c) % 5) as f32 / 2.0 - 1.0))
@@ -285,7 +289,7 @@ mod of_a_field {
     }
 
     #[test]
-    fn pull_backs_are_the_slopes() {
+    fn pull_backs_are_the_gradients() {
         let model = Model::pretrained();
         let decoder = model.decoder().unwrap();
         let latent = Latent::from_seed(&model.prior(), 5);
@@ -300,9 +304,9 @@ mod of_a_field {
         };
         let gradient = cotangent.pull_back(&field, grid);
         assert!((gradient.loss / value(&latent) - 1.0).abs() < 1e-4);
-        let (slope, along) = slopes(value, &latent, &gradient.vectors);
-        assert!((slope - along).abs() < 2e-2 * slope.abs(), "{slope} {along}");
-        // radiance is e^s times what the latent says: the slope by the log exposure is the value itself
+        let (difference, along) = derivatives(value, &latent, &gradient.vectors);
+        assert!((difference - along).abs() < 2e-2 * difference.abs(), "{difference} {along}");
+        // radiance is e^s times what the latent says: the derivative by the log exposure is the value itself
         assert!((f64::from(gradient.log_exposure) / gradient.loss - 1.0).abs() < 1e-4);
 
         let normals = [([0.0, 0.0, 1.0], [0.2, 0.7, 0.1]), ([0.6, 0.0, 0.8], [1.0, -0.5, 0.0])];
@@ -320,7 +324,7 @@ mod of_a_field {
         };
         let gradient = pull_back_irradiance(&field, grid, &normals);
         assert!((gradient.loss / value(&latent) - 1.0).abs() < 1e-4);
-        let (slope, along) = slopes(value, &latent, &gradient.vectors);
-        assert!((slope - along).abs() < 2e-2 * slope.abs(), "{slope} {along}");
+        let (difference, along) = derivatives(value, &latent, &gradient.vectors);
+        assert!((difference - along).abs() < 2e-2 * difference.abs(), "{difference} {along}");
     }
 }

@@ -4,7 +4,7 @@
 //! without the phase (−1)^m, normalised so that the functions are orthonormal over the sphere. The map is taken as what it
 //! is, constant within each pixel; the integrals over pixels are exact along φ and by Gauss quadrature along θ.
 //!
-//! A convolution with a kernel of the angle alone multiplies degree l by one number (Funk and Hecke), and a turn about z
+//! A convolution with a kernel of the angle alone multiplies degree l by one number (Funk and Hecke), and a rotation about z
 //! rotates (a_lm, b_lm) by mα.
 
 mod analysis;
@@ -61,20 +61,20 @@ impl Spectrum {
         self.coefficient(0, 0)[0].map(|c| c / (4.0 * std::f64::consts::PI).sqrt())
     }
 
-    /// The spectrum of the function turned by `angle` radians about z, counter-clockwise seen from above. Exact.
+    /// The spectrum of the function rotated by `angle` radians about z, counter-clockwise seen from above. Exact.
     #[must_use]
-    pub fn turned(&self, angle: f64) -> Self {
-        let mut turned = self.clone();
+    pub fn rotated_about_z(&self, angle: f64) -> Self {
+        let mut rotated = self.clone();
         for m in 1..=self.degree {
             let (s, c) = (m as f64 * angle).sin_cos();
             let at = first(self.degree, m);
-            for [r, g, b, sr, sg, sb] in &mut turned.coefficients[at..=at + self.degree - m] {
+            for [r, g, b, sr, sg, sb] in &mut rotated.coefficients[at..=at + self.degree - m] {
                 for (x, y) in [(r, sr), (g, sg), (b, sb)] {
                     (*x, *y) = (*x * c - *y * s, *x * s + *y * c);
                 }
             }
         }
-        turned
+        rotated
     }
 
     /// The function convolved with a kernel whose spectrum is `gains` (one per degree; those beyond are 0), sampled so densely
@@ -193,15 +193,15 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_is_a_turn_of_the_pixels() {
+    fn a_rotation_is_a_rotation_of_the_pixels() {
         let grid = Equirect::new(96, 48);
         let pixels: Vec<[f32; 3]> =
             (0..grid.len()).map(|k| [0, 1, 2].map(|c| ((k * (7 + c) * 31) % 97) as f32)).collect();
-        // what was at column i is seen at i − 5 after a counter-clockwise turn by 5 columns
-        let turned: Vec<[f32; 3]> =
+        // what was at column i is seen at i − 5 after a counter-clockwise rotation by 5 columns
+        let rotated: Vec<[f32; 3]> =
             (0..grid.len()).map(|k| pixels[k / 96 * 96 + (k % 96 + 5) % 96]).collect();
         let of = |pixels: &[[f32; 3]]| Spectrum::of(EnvironmentMap::new(grid, pixels).unwrap(), 60);
-        let (a, b) = (of(&pixels).turned(std::f64::consts::TAU * 5.0 / 96.0), of(&turned));
+        let (a, b) = (of(&pixels).rotated_about_z(std::f64::consts::TAU * 5.0 / 96.0), of(&rotated));
         for (x, y) in a.coefficients.as_flattened().iter().zip(b.coefficients.as_flattened()) {
             assert!((x - y).abs() < 1e-4, "{x} and {y}");
         }

@@ -16,19 +16,19 @@ fn a_graphics_device_brings_the_tensor_decoder_along() {
     assert_eq!(with(&["device=ndarray"]), (DeviceKind::Ndarray, DecoderBackend::Kernels));
     assert_eq!(with(&["device=wgpu"]), (DeviceKind::Wgpu, DecoderBackend::Tensors));
     // what is named stays, in either order
-    for order in [["device=wgpu", "decoder_by=kernels"], ["decoder_by=kernels", "device=wgpu"]] {
+    for order in [["device=wgpu", "decoder_backend=kernels"], ["decoder_backend=kernels", "device=wgpu"]] {
         assert_eq!(with(&order), (DeviceKind::Wgpu, DecoderBackend::Kernels));
     }
     // in a file too: left out it follows the device, written it stays
     let text = config.with_overrides(&["device=cuda"]).unwrap().to_toml().unwrap();
-    let line = "decoder_by = \"tensors\"\n";
+    let line = "decoder_backend = \"tensors\"\n";
     assert!(text.contains(line), "{text}");
     let read = |text: &str| TrainConfig::from_toml(text).unwrap().decoder_backend;
     assert_eq!(read(&text), DecoderBackend::Tensors);
     assert_eq!(read(&text.replace(line, "")), DecoderBackend::Tensors);
-    assert_eq!(read(&text.replace(line, "decoder_by = \"kernels\"\n")), DecoderBackend::Kernels);
+    assert_eq!(read(&text.replace(line, "decoder_backend = \"kernels\"\n")), DecoderBackend::Kernels);
     assert_eq!(
-        read(&config.to_toml().unwrap().replace("decoder_by = \"kernels\"\n", "")),
+        read(&config.to_toml().unwrap().replace("decoder_backend = \"kernels\"\n", "")),
         DecoderBackend::Kernels
     );
 }

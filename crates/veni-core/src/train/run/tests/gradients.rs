@@ -24,7 +24,7 @@ fn gradients_of_an_auto_decoder_match_finite_differences() {
         let mut config = Preset::Tiny.auto_decoder(3);
         config.loss.form = form;
         config.loss.kld = WeightSchedule::Constant(0.01);
-        config.loss.level = WeightSchedule::Constant(1.0);
+        config.loss.exposure = WeightSchedule::Constant(1.0);
         config.loss.log_mse = WeightSchedule::Constant(0.3);
         let (folder, mut config) = setup_of(config, 1);
         config.latents.as_mut().unwrap().free_exposure = true;

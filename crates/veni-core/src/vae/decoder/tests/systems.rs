@@ -81,9 +81,9 @@ fn each_keeps_the_symmetry_it_promises_and_no_more() {
         let decoder = build(&config, &device);
         let still = decoder.forward(latent(&device), directions(&device));
         let moves = |m: &Tensor<2>| {
-            let turned =
+            let rotated =
                 decoder.forward(rotate(latent(&device), m.clone()), directions(&device).matmul(m.clone()));
-            largest_difference(&still, &turned)
+            largest_difference(&still, &rotated)
         };
         let (z, x) = (moves(&about_z), moves(&about_x));
         let name = name(&config);

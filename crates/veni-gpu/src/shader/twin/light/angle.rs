@@ -33,15 +33,15 @@ pub(super) fn atan2(y: f32, x: f32) -> f32 {
 }
 
 impl LightTwin {
-    /// A direction of the packed light, as the turned scene has it.
-    pub fn veni_light_turned(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
-        let [s, c] = self.packed.uniform.turn;
+    /// A direction of the packed light, as the rotated scene has it.
+    pub fn veni_light_rotated(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let [s, c] = self.packed.uniform.rotation;
         [x * c - y * s, y * c + x * s, z]
     }
 
     /// And back.
-    pub fn veni_light_unturned(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
-        let [s, c] = self.packed.uniform.turn;
+    pub fn veni_light_unrotated(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let [s, c] = self.packed.uniform.rotation;
         [x * c + y * s, y * c - x * s, z]
     }
 }

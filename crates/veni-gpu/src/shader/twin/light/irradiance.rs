@@ -12,7 +12,7 @@ const POINTS: usize = 64;
 impl LightTwin {
     /// Irradiance of a surface with this unit normal: compact lights as discs, the rest by nine harmonics, not below 0.
     pub fn veni_irradiance(&self, normal: [f32; 3]) -> [f32; 3] {
-        let [x, y, z] = self.veni_light_unturned(normal);
+        let [x, y, z] = self.veni_light_unrotated(normal);
         let uniform = &self.packed.uniform;
         let terms = [1.0, y, z, x, x * y, y * z, 3.0 * z * z - 1.0, x * z, x * x - y * y];
         let rest = [0, 1, 2].map(|c| {

@@ -22,12 +22,12 @@ impl LightTwin {
         Self { packed }
     }
 
-    /// The same with another turn, radians about z, counter-clockwise seen from above.
+    /// The same with another rotation, radians about z, counter-clockwise seen from above.
     #[must_use]
-    pub fn turned(&self, radians: f64) -> Self {
+    pub fn rotated(&self, radians: f64) -> Self {
         let mut packed = self.packed.clone();
         let (sin, cos) = radians.sin_cos();
-        packed.uniform.turn = [sin as f32, cos as f32];
+        packed.uniform.rotation = [sin as f32, cos as f32];
         Self { packed }
     }
 }

@@ -32,7 +32,7 @@ impl LightTwin {
             (own, self.packed.texels[pixel], self.in_sun(own))
         };
         let [r, g, b, pdf] = self.both(texel, inside);
-        VeniLightSample { direction: self.veni_light_turned(own), pdf, radiance: [r, g, b] }
+        VeniLightSample { direction: self.veni_light_rotated(own), pdf, radiance: [r, g, b] }
     }
 
     /// The density with which a unit direction is drawn, 1/sr.
@@ -47,7 +47,7 @@ impl LightTwin {
     }
 
     fn seen(&self, direction: [f32; 3]) -> [f32; 4] {
-        let own = self.veni_light_unturned(direction);
+        let own = self.veni_light_unrotated(direction);
         self.both(self.packed.texels[self.veni_light_pixel(own)], self.in_sun(own))
     }
 
@@ -73,7 +73,7 @@ impl LightTwin {
         (pixel, [(coarse.floor() + 0.5) / 4096.0, (fine + 0.5) / 4096.0])
     }
 
-    /// The direction of a place before the turn.
+    /// The direction of a place before the rotation.
     fn direction(&self, pixel: usize, [x, y]: [f32; 2]) -> [f32; 3] {
         let [width, height] = self.packed.uniform.size.map(|n| n as usize);
         let (row, column) = (pixel / width, pixel % width);
@@ -90,7 +90,7 @@ impl LightTwin {
         [r * c, r * s, z]
     }
 
-    /// The pixel that a unit direction falls into, as it is before the turn.
+    /// The pixel that a unit direction falls into, as it is before the rotation.
     pub fn veni_light_pixel(&self, [x, y, z]: [f32; 3]) -> usize {
         let [width, height] = self.packed.uniform.size.map(|n| n as usize);
         let polar = atan2((x * x + y * y).sqrt(), z);

@@ -9,12 +9,12 @@ impl LightTwin {
         let Some(sun) = self.packed.uniform.lights.first().filter(|_| self.packed.uniform.has_sun) else {
             return VeniLightSample { direction: [0.0, 0.0, 1.0], pdf: 0.0, radiance: [0.0; 3] };
         };
-        let direction = self.veni_light_turned(self.on_sun(u));
+        let direction = self.veni_light_rotated(self.on_sun(u));
         let radiance = sun.irradiance.map(|e| sun.per_solid_angle * e);
         VeniLightSample { direction, pdf: sun.per_solid_angle, radiance }
     }
 
-    /// A direction of the disc before the turn, even in solid angle.
+    /// A direction of the disc before the rotation, even in solid angle.
     pub(super) fn on_sun(&self, [u, v]: [f32; 2]) -> [f32; 3] {
         let uniform = &self.packed.uniform;
         let sun = uniform.lights.first().copied().unwrap_or_default();
@@ -27,7 +27,7 @@ impl LightTwin {
         d.map(|v| v / length)
     }
 
-    /// Whether a direction before the turn lies within the disc.
+    /// Whether a direction before the rotation lies within the disc.
     pub(super) fn in_sun(&self, own: [f32; 3]) -> bool {
         let uniform = &self.packed.uniform;
         let Some(sun) = uniform.lights.first().filter(|_| uniform.has_sun) else { return false };

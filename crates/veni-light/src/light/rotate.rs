@@ -1,18 +1,18 @@
-//! A light turned about z.
+//! A light rotated about z.
 
 use std::f64::consts::PI;
 
 use super::lit::Light;
 
 impl Light {
-    /// The same scene turned by `angle` radians about z, counter-clockwise seen from above. Lights, harmonics and irradiance turn
-    /// exactly; the residual exactly by whole columns, between them as the mean of two columns by their distance, which keeps
-    /// the energy.
+    /// The same scene rotated by `angle` radians about z, counter-clockwise seen from above. Lights, harmonics and
+    /// irradiance rotate exactly; the residual exactly by whole columns, between them as the mean of two columns by
+    /// their distance, which keeps the energy.
     #[must_use]
-    pub fn turned(&self, angle: f64) -> Self {
+    pub fn rotated(&self, angle: f64) -> Self {
         let mut out = self.clone();
-        out.lights = self.lights.turned(angle);
-        out.harmonics = self.harmonics.turned(angle);
+        out.lights = self.lights.rotated(angle);
+        out.harmonics = self.harmonics.rotated_about_z(angle);
         out.angle = self.angle + angle;
         // a column looks where one `shift` to its right looked
         let width = self.grid.width;

@@ -1,10 +1,10 @@
-//! What the code of a light is for: turning it turns the light, exactly, and between two codes lie other skies.
+//! What the code of a light is for: rotating it rotates the light, exactly, and between two codes lie other skies.
 //!
 //! ```sh
-//! cargo run --release -p veni-light --features pretrained --example 3_turn_and_interpolate
+//! cargo run --release -p veni-light --features pretrained --example 3_rotate_and_interpolate
 //! ```
 //!
-//! Prints how exact the turn is, and writes `between.ppm`: eleven skies, one above the other, from one to another.
+//! Prints how exact the rotation is, and writes `between.ppm`: eleven skies, one above the other, from one to another.
 
 #![allow(clippy::print_stdout, reason = "an example")]
 
@@ -17,19 +17,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let decoder = model.decoder()?;
     let [morning, evening] = [1, 2].map(|seed| Latent::from_seed(&model.prior(), seed));
 
-    // The radiance in a direction, and that of the turned light in the turned direction: no pixel is resampled.
+    // The radiance in a direction, and that of the rotated light in the rotated direction: no pixel is resampled.
     let angle = 1.234_f64;
     let (sin, cos) = angle.sin_cos();
-    let (still, turned) = (decoder.condition(&morning)?, decoder.condition(&morning.turned(angle))?);
+    let (still, rotated) = (decoder.condition(&morning)?, decoder.condition(&morning.rotated(angle))?);
     let mut largest = 0.0_f32;
     for d in Equirect::new(64, 32).directions() {
         let [x, y, z] = d.map(f64::from);
         let there = [x * cos - y * sin, x * sin + y * cos, z].map(|v| v as f32);
-        for (a, b) in still.log_radiance(d).into_iter().zip(turned.log_radiance(there)) {
+        for (a, b) in still.log_radiance(d).into_iter().zip(rotated.log_radiance(there)) {
             largest = largest.max((a - b).abs());
         }
     }
-    println!("turned by {angle} radians, log radiance differs by {largest:.1e} at most");
+    println!("rotated by {angle} radians, log radiance differs by {largest:.1e} at most");
 
     let grid = Equirect::new(256, 128);
     let mut picture = format!("P6 {} {} 255\n", grid.width, 11 * grid.height).into_bytes();

@@ -27,7 +27,7 @@ const TOWN: Vec3 = Vec3::new(0.009, 0.0055, 0.0022);
 const LAMP_REACH: f32 = 60.0;
 
 /// Everything that a ray needs.
-pub(super) struct Stage<'a> {
+pub(super) struct SceneView<'a> {
     pub(super) scene: &'a Scene,
     pub(super) sky: Sky,
     view: View,
@@ -39,7 +39,7 @@ pub(super) struct Stage<'a> {
     near: Ambient,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> SceneView<'a> {
     pub(super) fn new(scene: &'a Scene) -> Self {
         let sky = Sky::new(scene);
         let mut layout = layout(scene);

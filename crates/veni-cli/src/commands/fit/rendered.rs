@@ -6,8 +6,8 @@ use anyhow::{Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use veni_fit::matching_exposure;
 use veni_fit::shade::{
-    Camera, Colour, ExposureForm, Lights, Material, NormalMap, ShadedImage, ShadedLoss, ShadingForm, Surface,
-    Transfer, read_albedo, read_mask,
+    Camera, Colour, ExposureForm, Lights, Material, NormalMap, RenderedImage, RenderingLoss, ShadingForm,
+    Surface, Transfer, read_albedo, read_mask,
 };
 use veni_image::Picture;
 use veni_light::Error;
@@ -20,7 +20,7 @@ use crate::output::CAMERA;
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Rendered pictures")]
-pub(super) struct Shaded {
+pub(super) struct Rendered {
     /// The picture shows a surface with these normals (world axes, z up, as 'render-probe --normals' writes them):
     /// find the light on it
     #[arg(long, value_name = "NORMALS", requires_all = ["output", "pictures"])]
@@ -61,7 +61,7 @@ enum Shading {
     Reference,
 }
 
-impl Shaded {
+impl Rendered {
     /// The picture as a function of the light on it.
     pub(super) fn image(
         &self,
@@ -69,7 +69,7 @@ impl Shaded {
         mask: Option<&Path>,
         picture: &Picture,
         view: Option<View>,
-    ) -> Result<ShadedImage> {
+    ) -> Result<RenderedImage> {
         let map = NormalMap::read(normals).map_err(alone)?;
         let sizes = |path: &Path, size: [usize; 2]| -> Result<()> {
             if size != picture.size() {
@@ -104,18 +104,21 @@ impl Shaded {
         };
         let grid = Equirect::new(self.lights, self.lights / 2);
         let (lights, form, loss, exposure) = match self.shading {
-            Shading::Physical => {
-                (Lights::equirect(grid), ShadingForm::Physical, ShadedLoss::default(), ExposureForm::Natural)
-            }
+            Shading::Physical => (
+                Lights::equirect(grid),
+                ShadingForm::Physical,
+                RenderingLoss::default(),
+                ExposureForm::Natural,
+            ),
             Shading::Reference => (
                 Lights::new(&grid.directions(), &vec![1.0; grid.len()])?,
                 ShadingForm::Reference,
-                ShadedLoss::ReferenceLog,
+                RenderingLoss::ReferenceLog,
                 ExposureForm::Reference,
             ),
         };
         let transfer = Transfer::new(&surface, &material, lights, form)?;
-        Ok(ShadedImage::new(transfer, picture.pixels(), loss)?.with_exposure(exposure))
+        Ok(RenderedImage::new(transfer, picture.pixels(), loss)?.with_exposure(exposure))
     }
 
     /// From the camera that the normals' file names, or from --fov and --look.
@@ -146,7 +149,7 @@ impl Shaded {
     /// Brings each start to the picture's mean brightness; the reference implementation's starts stay where they are.
     pub(super) fn exposed(
         &self,
-        image: &ShadedImage,
+        image: &RenderedImage,
         picture: &Picture,
         model: &FitModel,
         starts: &mut [Latent],

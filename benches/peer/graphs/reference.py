@@ -1,4 +1,4 @@
-"""The authors' graph: everything computed where the paper's formulas put it, for every ray and every token.
+"""The reference graph: everything computed where the paper's formulas put it, for every ray and every token.
 
 Features are [.., channel, coordinate] and maps of channels are einsums. The decoder repeats the latent for every ray:
 invariants, keys, values and the attention over its single key are computed ray by ray. VN-ReLUs apply W and U to the
@@ -14,9 +14,9 @@ from torch.nn import functional as F
 import weights as names
 
 
-class Authors:
+class Reference:
     def __init__(self, sizes, ours, kind=torch.float32):
-        theirs = names.to_authors(ours, sizes)
+        theirs = names.to_reference(ours, sizes)
         self.sizes = sizes
         self.weights = {name: w.to(kind).clone().requires_grad_() for name, w in theirs.items()}
 
@@ -28,7 +28,7 @@ class Authors:
     def gradients(self):
         """By our names. Queries and keys of the decoder are left out; theirs are exactly 0."""
         found = {name: w.grad for name, w in self.weights.items() if w.grad is not None}
-        return names.from_authors(found, self.sizes)
+        return names.from_reference(found, self.sizes)
 
     # ---- encoder ----
 
@@ -102,30 +102,30 @@ class Authors:
         inner = einsum("mnc,mc->mn", horizontal, directions[:, :2])
         radius = directions[:, :2].norm(dim=-1, keepdim=True)
         x = encoded(torch.cat([inner, directions[:, 2:], radius], -1))
-        told = self.told(latent).flatten(1)
+        condition = self.condition(latent).flatten(1)
         x = self.linear(x, "field.network.residual_projection")
         for index in range(self.sizes.layers):
             layer = f"field.network.layers.{index}"
-            x = self.norm(self.attention(x, told, f"{layer}.mha") + x, f"{layer}.norm1")
+            x = self.norm(self.attention(x, condition, f"{layer}.mha") + x, f"{layer}.norm1")
             hidden = F.relu(self.linear(x, f"{layer}.fc.0"))
             x = self.norm(self.linear(hidden, f"{layer}.fc.2") + x, f"{layer}.norm2")
         return self.linear(x, "field.network.fc").reshape(batch, rays, 3)
 
-    def told(self, latent):
+    def condition(self, latent):
         """Vector-Neuron invariants of every latent vector, and its z: [M, N, 3] → [M, N, 3]."""
         y = self.vn_linear(latent[..., None, :2], "field.vn_proj_in.1.weight")
         a = self.vn_relu(self.vn_linear(y, "field.vn_invar.mlp.0.weight"), "field.vn_invar.mlp.1")
         invariants = einsum("mnci,mnoi->mnco", y, a).squeeze(2)
         return torch.cat([invariants, latent[..., 2:]], -1)
 
-    def attention(self, x, told, name):
-        """Multi-head attention of every ray over one token, its own copy of what is told about the latent."""
+    def attention(self, x, condition, name):
+        """Multi-head attention of every ray over one token, its own copy of what it is conditioned on."""
         count = self.sizes.decoder_heads
 
         def heads(of, part):
             return self.linear(of[:, None], f"{name}.{part}").unflatten(-1, (count, -1)).transpose(1, 2)
 
-        q, k, v = heads(x, "query"), heads(told, "key"), heads(told, "value")
+        q, k, v = heads(x, "query"), heads(condition, "key"), heads(condition, "value")
         logits = einsum("mhqd,mhkd->mhqk", q, k) / math.sqrt(q.shape[-1])
         seen = einsum("mhqk,mhkd->mhqd", logits.softmax(-1), v)
         return self.linear(seen.transpose(1, 2).flatten(1), f"{name}.fc_out")

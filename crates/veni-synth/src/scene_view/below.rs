@@ -4,16 +4,16 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::Stage;
+use super::SceneView;
 use crate::ground::{fresnel, glitter};
-use crate::scene::Place;
+use crate::scene::Setting;
 
 /// Variance of the slopes of ground that shines.
 const SHEEN_VARIANCE: f32 = 0.06;
 /// Sine of the depression below which a mirrored sky has lost all detail.
 const BROAD_BELOW: f32 = 0.5;
 
-impl Stage<'_> {
+impl SceneView<'_> {
     pub(super) fn ground(
         &self,
         eye: Vec3,
@@ -23,7 +23,7 @@ impl Stage<'_> {
         jitter: f32,
         mirrors: bool,
     ) -> Vec3 {
-        if self.scene.place == Place::PureSky {
+        if self.scene.setting == Setting::PureSky {
             return self.mirrored_sky(direction, footprint, jitter);
         }
         let point = eye + t * direction;

@@ -2,21 +2,21 @@
 
 use super::network::{ImageLoss, Network};
 use super::{FitConfig, FitResult, LatentDecoder, check_prior, check_starts, optimise};
-use crate::shade::ShadedImage;
+use crate::shade::RenderedImage;
 use crate::{Error, Result};
 use veni_light::latent::{Latent, Prior};
 
 /// Optimises one latent per image from `start`. Each image's loss is its own
-/// ([`ShadedLoss`](crate::shade::ShadedLoss)): [`FitConfig::objective`] is not looked at. All must have the same lights, those the
-/// decoder is asked for. A latent's log exposure is the number that the image's
+/// ([`RenderingLoss`](crate::shade::RenderingLoss)): [`FitConfig::objective`] is not looked at. All must have the same
+/// lights, those the decoder is asked for. A latent's log exposure is the number that the image's
 /// [`ExposureForm`](crate::shade::ExposureForm) takes. `observer` gets the number of updates made and the mean loss.
 ///
 /// # Errors
 /// [`Error::Invalid`] if the numbers of images and starts or their sizes disagree, if there are none, if lights
 /// differ, or if the loss is no longer finite.
-pub fn fit_shaded(
+pub fn fit_rendered(
     decoder: &dyn LatentDecoder,
-    images: &[ShadedImage],
+    images: &[RenderedImage],
     prior: Option<&Prior>,
     start: &[Latent],
     config: &FitConfig,
@@ -32,7 +32,7 @@ pub fn fit_shaded(
         return Err(Error::invalid("images that are fitted together must be lit by the same lights"));
     }
     let network = Network::new(decoder, lights.directions().to_vec());
-    optimise(&network, &ImageLoss::Shaded(images), prior, start, config, observer)
+    optimise(&network, &ImageLoss::Rendered(images), prior, start, config, observer)
 }
 
 /// The log exposure at which the rendering of light `log_radiance` is as bright, on average, as the picture `target` (both in
@@ -40,7 +40,7 @@ pub fn fit_shaded(
 ///
 /// # Panics
 /// If there is not one log radiance per light.
-pub fn matching_exposure(image: &ShadedImage, target: &[[f32; 3]], log_radiance: &[[f32; 3]]) -> f32 {
+pub fn matching_exposure(image: &RenderedImage, target: &[[f32; 3]], log_radiance: &[[f32; 3]]) -> f32 {
     let rendering =
         image.transfer().render(&log_radiance.iter().map(|p| p.map(f32::exp)).collect::<Vec<_>>());
     let (mut seen, mut rendered) = (0.0f64, 0.0f64);
@@ -58,7 +58,8 @@ mod tests {
     use super::super::tests::{decoder, latent};
     use super::*;
     use crate::shade::{
-        Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, ShadedLoss, ShadingForm, Surface, Transfer,
+        Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderingLoss, ShadingForm, Surface,
+        Transfer,
     };
     use veni_light::sphere::Equirect;
 
@@ -67,7 +68,7 @@ mod tests {
     }
 
     /// A glossy ball under the light of a latent.
-    fn ball(light: &Latent) -> ShadedImage {
+    fn ball(light: &Latent) -> RenderedImage {
         let place = ([0.0; 3], 1.0);
         let camera = Camera::framing(place, [0.0; 2], REFERENCE_FIELD_OF_VIEW, [20, 20], 0.05).unwrap();
         let surface = Surface::sphere(&camera, place, 20, 20).unwrap();
@@ -76,7 +77,7 @@ mod tests {
         let transfer = Transfer::new(&surface, &material, lights, ShadingForm::Physical).unwrap();
         let field = decoder().condition(light).unwrap();
         let photograph = transfer.render(&field.bake(Equirect::new(16, 8)));
-        ShadedImage::new(transfer, &photograph, ShadedLoss::default()).unwrap()
+        RenderedImage::new(transfer, &photograph, RenderingLoss::default()).unwrap()
     }
 
     #[test]
@@ -92,14 +93,14 @@ mod tests {
         let image = [ball(&truth)];
         let config = FitConfig { prior: 0.0, free_exposure: true, ..FitConfig::light() };
         let none = FitConfig { steps: 0, ..config };
-        let exact =
-            fit_shaded(&decoder, &image, None, std::slice::from_ref(&truth), &none, &mut |_, _| {}).unwrap();
+        let exact = fit_rendered(&decoder, &image, None, std::slice::from_ref(&truth), &none, &mut |_, _| {})
+            .unwrap();
         assert!(exact.last[0] < 1e-9, "{}", exact.last[0]);
         let mut near = truth;
         near.vectors.as_flattened_mut().iter_mut().for_each(|v| *v += 0.05);
         near.log_exposure = 0.0;
         let mut calls = 0;
-        let found = fit_shaded(&decoder, &image, None, &[near], &config, &mut |_, _| calls += 1).unwrap();
+        let found = fit_rendered(&decoder, &image, None, &[near], &config, &mut |_, _| calls += 1).unwrap();
         assert!(found.last[0] < 1e-6 * found.losses[0], "{} of {}", found.last[0], found.losses[0]);
         assert!((found.latents[0].log_exposure - 0.4).abs() < 1e-2 && calls == 400);
     }
@@ -119,8 +120,8 @@ mod tests {
     fn images_of_other_lights_and_missing_starts_are_refused() {
         let decoder = decoder();
         let config = FitConfig::light();
-        let refused = |images: &[ShadedImage], start: &[Latent]| {
-            fit_shaded(&decoder, images, None, start, &config, &mut |_, _| {}).unwrap_err().to_string()
+        let refused = |images: &[RenderedImage], start: &[Latent]| {
+            fit_rendered(&decoder, images, None, start, &config, &mut |_, _| {}).unwrap_err().to_string()
         };
         assert!(refused(&[], &[]).contains("0 images"));
         assert!(refused(&[ball(&lit(1, 0.0))], &[]).contains("0 latents"));

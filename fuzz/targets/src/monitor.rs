@@ -11,7 +11,7 @@ use crate::{Target, on_disk};
 /// An input that takes longer than this hangs.
 pub const LONGEST: Duration = Duration::from_secs(10);
 
-/// Places of all panics since [`watch`], by the thread that panicked and by those it started alike.
+/// Places of all panics since [`note_panics`], by the thread that panicked and by those it started alike.
 static PANICS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// How a target did.
@@ -28,7 +28,7 @@ pub struct Tally {
 }
 
 /// From now on panics are noted, not printed.
-pub fn watch() {
+pub fn note_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         std::panic::set_hook(Box::new(|info| {
@@ -104,7 +104,7 @@ impl Tally {
     }
 }
 
-/// The process's largest resident size begins anew (Linux).
+/// The process's largest resident size is reset (Linux).
 fn reset_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
