@@ -146,6 +146,11 @@ impl Observation {
         self.log_exposure
     }
 
+    /// How much of each pixel is known, if not all of all.
+    pub fn mask(&self) -> Option<&[f32]> {
+        self.mask.as_deref()
+    }
+
     /// Which of the 3·W·H values are clipped, if any.
     pub fn clipped(&self) -> Option<&[bool]> {
         self.clipped.as_deref()

@@ -96,7 +96,7 @@ fn captures_and_copies_are_joined_through_each_other() {
 fn a_group_reaches_through_several_links_and_leaves_the_others_out() {
     let originals = panoramas();
     let [a, b, c, d] = [0, 1, 2, 3].map(|k| &originals[k]);
-    let prints: Vec<_> = [a, &a.mirror(), b, &b.turn(2.0), c, d].map(Fingerprint::new).into();
+    let prints: Vec<_> = [a, &a.mirror(), b, &b.rotated(2.0), c, d].map(Fingerprint::new).into();
     let captures = ["e", "d", "d", "c", "c", "z"];
     let members: Vec<_> = (captures.into_iter().zip(&prints))
         .map(|(capture, fingerprint)| Member { capture, fingerprint })
