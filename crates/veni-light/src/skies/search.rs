@@ -96,23 +96,12 @@ impl State {
         Some(sun.luminance_to(now + by, draw))
     }
 
-    /// What moves the temperature to what is asked: the derivative of its logarithm, through the field and the sun. None where there
-    /// is no temperature.
+    /// What moves the temperature to what is asked: the derivative of its logarithm, through the field and the sun.
     fn temperature(&self, request: &SkyRequest, prior: &Prior) -> Option<Row> {
         let asked = request.temperature?;
         let direct = self.sun.map_or([0.0; 3], |t| Self::direct(&t));
         let total = [0, 1, 2].map(|c| self.diffuse[c] + direct[c]);
-        let log = |rgb: [f64; 3]| temperature(rgb).map(f64::ln);
-        let by = (asked.ln() - log(total)?).clamp(-STRIDE, STRIDE);
-        let mut by_channel = [0.0; 3];
-        for c in 0..3 {
-            let at = |factor: f64| {
-                let mut moved = total;
-                moved[c] *= factor;
-                log(moved)
-            };
-            by_channel[c] = (at(1.0 + DIFFERENCE)? - at(1.0 - DIFFERENCE)?) / (2.0 * DIFFERENCE * total[c]);
-        }
+        let (by, by_channel) = towards(asked, total)?;
         let gradient = pull_back_irradiance(&self.field, self.grid, &[(UP, by_channel)]);
         let mut row = Row { by, ..prior.row(&gradient.vectors) };
         if let (Some(sun), Some(t)) = (prior.sun(), self.sun) {
@@ -122,6 +111,26 @@ impl State {
         }
         Some(row)
     }
+}
+
+/// By how much the logarithm of the temperature is to change, and its derivatives with respect to the channels of the light. Of light
+/// that is too red or too blue for a temperature, the same of its tint, ln B/R, towards white.
+fn towards(asked: f64, total: [f64; 3]) -> Option<(f64, [f64; 3])> {
+    let tint = |[r, _, b]: [f64; 3]| Some((b / r).ln());
+    let log = |rgb: [f64; 3]| temperature(rgb).map(f64::ln);
+    let (measure, wanted): (&dyn Fn([f64; 3]) -> Option<f64>, f64) =
+        if log(total).is_some() { (&log, asked.ln()) } else { (&tint, 0.0) };
+    let by = (wanted - measure(total)?).clamp(-STRIDE, STRIDE);
+    let mut derivatives = [0.0; 3];
+    for c in 0..3 {
+        let at = |factor: f64| {
+            let mut moved = total;
+            moved[c] *= factor;
+            measure(moved)
+        };
+        derivatives[c] = (at(1.0 + DIFFERENCE)? - at(1.0 - DIFFERENCE)?) / (2.0 * DIFFERENCE * total[c]);
+    }
+    Some((by, derivatives))
 }
 
 /// ∂/∂t of Σ d E for the derivatives d with respect to the irradiance of a level surface.

@@ -37,11 +37,12 @@ fn what_is_asked_is_measured() {
         };
         let latent = request.draw(&decoder, &prior, &mut Stream::from_seed(seed)).unwrap();
         let came = measured(&decoder, &latent);
-        let [azimuth, elevation] = came.sun.unwrap();
+        let [azimuth, elevation] =
+            came.sun.unwrap_or_else(|| panic!("seed {seed}: {came:?} {:?}", latent.lights));
         let apart = ((azimuth - sun[0]).sin() * sun[1].cos()).hypot(elevation - sun[1]);
         assert!(apart < 2f64.to_radians(), "seed {seed}: {came:?}");
         assert!((came.overcast / overcast - 1.0).abs() < 0.1, "seed {seed}: {came:?}");
-        assert!((came.temperature.unwrap() / kelvin - 1.0).abs() < 0.1, "seed {seed}: {came:?}");
+        assert!((came.temperature.unwrap_or(0.0) / kelvin - 1.0).abs() < 0.1, "seed {seed}: {came:?}");
     }
 }
 
@@ -64,7 +65,7 @@ fn a_moving_sun_makes_no_jumps() {
     let at = |t: f64| {
         let sun =
             SunRequest { azimuth: Some(2.0 - 4.0 * t), elevation: Some(0.02 + t), ..SunRequest::default() };
-        let request = SkyRequest { sun, overcast: Some(0.25), ..SkyRequest::default() };
+        let request = SkyRequest { sun, ..SkyRequest::default() };
         request.draw(&decoder, &prior, &mut Stream::from_seed(5)).unwrap()
     };
     let frames: Vec<_> = (0..=50).map(|k| at(f64::from(k) / 50.0)).collect();

@@ -1,6 +1,9 @@
 //! Fitting the density of the sun to codes whose suns are known. MODEL (74).
 
-use super::{COLOUR, ELEVATION, LOGIT_TO_PROBIT, LUMINANCE, MEASURES, RADIUS, SunPrior, WIDEST, colour};
+use super::{
+    COLOUR, ELEVATION, LOGIT_TO_PROBIT, LUMINANCE, MEASURES, RADIUS, SunPrior, WIDEST, colour,
+    elevation_measure,
+};
 use crate::cholesky::{self, Complex};
 use crate::compact::CompactLight;
 use crate::latent::{Latent, Prior};
@@ -86,7 +89,7 @@ impl Measured {
             return None;
         }
         let mut t = [0.0; MEASURES];
-        t[ELEVATION] = (sine / (1.0 - sine)).ln();
+        t[ELEVATION] = elevation_measure(sine);
         t[LUMINANCE] = luminance.ln();
         COLOUR.iter().zip(ratios).for_each(|(at, ratio)| t[*at] = ratio.ln());
         t[RADIUS] = f64::from(sun.radius).ln();

@@ -3,9 +3,9 @@
 //! In the whitened coordinates of [`Prior`], w = L⁻¹c and g = K⁻¹(z − μ), with e, ξ and η (circular complex) standard normal:
 //!
 //! - azimuth φ: the argument of ⟨a, w⟩ + σe,
-//! - measures t = b + B g + S ξ: logit of the sine of the elevation, logarithms of luminance, red/green and blue/green of the
+//! - measures t = b + B g + S ξ: ln((s + 0.1)/(1.1 − s)) of the sine s of the elevation, logarithms of luminance, red/green and blue/green of the
 //!   irradiance at normal incidence before the exposure, and of the angular radius,
-//! - there is a sun where ⟨p, g⟩ + p₀ + η > 0.
+//! - there is a sun where ⟨p, g⟩ + p₀ + η > 0, and s > 0.
 //!
 //! A turn of the code multiplies w by e^{iα} and with it the sun's direction: the density is equivariant, exactly.
 
@@ -32,6 +32,8 @@ const COLOUR: [usize; 2] = [2, 3];
 const RADIUS: usize = 4;
 /// A logistic function of 1.702 x is within 0.01 of the normal distribution's at x.
 const LOGIT_TO_PROBIT: f64 = 1.702;
+/// How far beyond the horizon and the zenith the elevation's measure reaches, in its sine.
+const MARGIN: f64 = 0.1;
 /// Widest sun that is drawn, radians: 6°.
 const WIDEST: f64 = 6.0 * std::f64::consts::PI / 180.0;
 
@@ -91,7 +93,8 @@ impl SunPrior {
         if self.score(draw) <= 0.0 {
             return None;
         }
-        Some(self.light(self.heading(draw), self.measures(draw)))
+        let t = self.measures(draw);
+        (sine(&t) > 0.0).then(|| self.light(self.heading(draw), t))
     }
 
     /// The most likely sun of these vectors, and how likely it is that there is one at all.
@@ -107,7 +110,7 @@ impl SunPrior {
     }
 
     fn light(&self, [x, y]: Complex, t: [f64; MEASURES]) -> CompactLight {
-        let sine = sine(&t);
+        let sine = sine(&t).max(0.0);
         let length = (x * x + y * y).sqrt();
         let cosine = (1.0 - sine * sine).sqrt() / length.max(f64::MIN_POSITIVE);
         let direction = [x * cosine, y * cosine, sine].map(|v| v as f32);
@@ -158,9 +161,15 @@ impl Prior {
     }
 }
 
-/// Sine of the elevation. Here as below exact operations and our own exponential alone: a seed is a sky on every machine.
+/// The elevation's measure, ln((s + a)/(1 + a − s)) of its sine s: as a logit it hardly bounds the sine, and with a = 0.1 the horizon
+/// and the zenith are no further from the middle of the sky than a sample may be.
+pub(crate) fn elevation_measure(sine: f64) -> f64 {
+    ((sine + MARGIN) / (1.0 + MARGIN - sine)).ln()
+}
+
+/// The inverse, the sine of the elevation, below 0 for a sun that has set. Here as below exact operations and our own exponential alone: a seed is a sky on every machine.
 pub(crate) fn sine(t: &[f64; MEASURES]) -> f64 {
-    1.0 / (1.0 + exp(-t[ELEVATION]))
+    ((1.0 + 2.0 * MARGIN) / (1.0 + exp(-t[ELEVATION])) - MARGIN).min(1.0)
 }
 
 /// Irradiance at normal incidence.

@@ -1,6 +1,6 @@
 //! Suns on request. MODEL (75).
 
-use super::{ELEVATION, LUMINANCE, MEASURES, SunDraw, SunPrior};
+use super::{ELEVATION, LUMINANCE, MEASURES, SunDraw, SunPrior, elevation_measure};
 use crate::cholesky::Complex;
 use crate::latent::draw::{Draw, Row};
 
@@ -36,7 +36,7 @@ impl SunPrior {
         });
         let elevation = request.elevation.map(|elevation| {
             let sine = elevation.sin().clamp(EDGE, 1.0 - EDGE);
-            self.measure_to((sine / (1.0 - sine)).ln(), ELEVATION, draw)
+            self.measure_to(elevation_measure(sine), ELEVATION, draw)
         });
         presence.into_iter().chain(elevation).collect()
     }
