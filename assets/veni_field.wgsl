@@ -15,7 +15,10 @@ const VENI_BLOCK: u32 = 4u;
 //                  then per layer W1 and W2, one row per input feature
 //   veni_vectors   per layer gamma1, beta1, b1, b2, gamma2; then the three output rows and the output bias
 //   veni_latents   per latent: bias of the input projection with the first layer's attention, per layer beta2
-//                  with the next layer's attention, N x (x, y high parts, x, y low parts), (log exposure, VENI_COLUMNS, VENI_LAYERS, N + 2)
+//                  with the next layer's attention, N x (x, y high parts, x, y low parts), (log exposure, VENI_COLUMNS, VENI_LAYERS, N + 2);
+//                  VENI_MAX_LIGHTS x (direction, extent), (radiance in the middle, -), with their number in the first "-"; an extent
+//                  above 0 is 4 sin^2 (r/2) of a disc of radius r, one below 0 -kappa/2 of a glow;
+//                  VENI_MAX_LOBES x (direction, -sharpness/2), (amplitude, -), with their number in the first "-"
 //
 // The constants VENI_LATENTS (N), VENI_HIDDEN (h), VENI_LAYERS and VENI_COLUMNS are put in front of this file.
 
@@ -49,13 +52,26 @@ fn veni_output(channel: u32) -> u32 {
     return (5u * VENI_LAYERS + channel) * VENI_COLUMNS;
 }
 
+const VENI_MAX_LIGHTS: u32 = 8u;
+const VENI_MAX_LOBES: u32 = 16u;
+
 fn veni_latent(index: u32) -> u32 {
-    return index * (VENI_COLUMNS * (VENI_LAYERS + 1u) + VENI_LATENTS + 1u);
+    return index * (veni_latent_lobes(0u) + 2u * VENI_MAX_LOBES);
 }
 
 // The vectors of a latent whose block begins at `latent`.
 fn veni_latent_vectors(latent: u32) -> u32 {
     return latent + VENI_COLUMNS * (VENI_LAYERS + 1u);
+}
+
+// The lights of a latent whose block begins at `latent`.
+fn veni_latent_lights(latent: u32) -> u32 {
+    return veni_latent_vectors(latent) + VENI_LATENTS + 1u;
+}
+
+// Its lobes.
+fn veni_latent_lobes(latent: u32) -> u32 {
+    return veni_latent_lights(latent) + 2u * VENI_MAX_LIGHTS;
 }
 
 // VENI_COLUMNS, VENI_LAYERS and the number of inputs as data: a loop up to one of them stays a loop. Unrolled, the network
@@ -134,6 +150,54 @@ fn veni_encode(latent: u32, index: u32, d: vec3f) -> VeniFeatures {
     return VeniFeatures(once.x, fourfold.x, once.y, fourfold.y, value);
 }
 
+// A latent's compact lights and lobes in one direction. MODEL (71, 72).
+//
+// Angles are chords: |d - u|^2 does not cancel where a light or a lobe is narrow.
+
+// Linear Rec. 709 radiance of the first latent's lights alone, which `veni_radiance` adds. A renderer that draws the sun as a light
+// of its own leaves it out.
+fn veni_lights(direction: vec3f) -> vec3f {
+    return veni_lights_of(0u, direction);
+}
+
+// The same by any of the latents that were uploaded together.
+fn veni_lights_of(index: u32, direction: vec3f) -> vec3f {
+    let first = veni_latent_lights(veni_latent(index));
+    let count = u32(veni_latents[first + 1u].w);
+    var sum = vec3f();
+    for (var m = 0u; m < count; m++) {
+        sum += veni_light_at(first + 2u * m, direction);
+    }
+    return sum;
+}
+
+// The light that lies at `at`: a disc where |d - u|^2 is at most its extent, or a glow that falls off by a negative extent.
+fn veni_light_at(at: u32, direction: vec3f) -> vec3f {
+    let light = veni_latents[at];
+    let away = direction - light.xyz;
+    let square = dot(away, away);
+    let disc = select(0.0, 1.0, square <= light.w);
+    return veni_latents[at + 1u].xyz * select(disc, veni_gauss(light.w * square), light.w < 0.0);
+}
+
+// What the lobes of the latent whose block begins at `latent` add to log radiance.
+fn veni_lobes(latent: u32, direction: vec3f) -> vec3f {
+    let first = veni_latent_lobes(latent);
+    let count = u32(veni_latents[first + 1u].w);
+    var sum = vec3f();
+    for (var k = 0u; k < count; k++) {
+        let lobe = veni_latents[first + 2u * k];
+        let away = direction - lobe.xyz;
+        sum += veni_latents[first + 2u * k + 1u].xyz * veni_gauss(lobe.w * dot(away, away));
+    }
+    return sum;
+}
+
+// Exponents beyond the range of f32 must not become infinite on the way.
+fn veni_gauss(exponent: f32) -> f32 {
+    return exp(max(exponent, -87.0));
+}
+
 // The whole network for one direction in one invocation: for the miss shader of a path tracer.
 //
 // The host declares, in any group and at any binding, read-only storage buffers of these names:
@@ -144,14 +208,14 @@ fn veni_weight(row: u32, column: u32) -> vec4f {
     return vec4f(veni_matrices[row * VENI_COLUMNS + column]);
 }
 
-// Natural log of linear Rec. 709 radiance from the native unit direction (z up), by the first latent.
+// Natural log of linear Rec. 709 radiance from the native unit direction (z up), by the first latent, without its lights.
 fn veni_log_radiance(direction: vec3f) -> vec3f {
     return veni_log_radiance_of(0u, direction);
 }
 
-// Linear Rec. 709 radiance, always finite.
+// Linear Rec. 709 radiance, lights included, always finite.
 fn veni_radiance(direction: vec3f) -> vec3f {
-    return veni_exp(veni_log_radiance_of(0u, direction));
+    return min(veni_exp(veni_log_radiance_of(0u, direction)) + veni_lights(direction), vec3f(3.4028234e38));
 }
 
 // Held within the range of f32, so that finite logarithms give finite light.
@@ -159,7 +223,7 @@ fn veni_exp(log_radiance: vec3f) -> vec3f {
     return exp(clamp(log_radiance, vec3f(-87.0), vec3f(88.5)));
 }
 
-// The same by any of the latents that were uploaded together.
+// Log radiance by any of the latents that were uploaded together.
 fn veni_log_radiance_of(index: u32, direction: vec3f) -> vec3f {
     let latent = veni_latent(index);
     let counts = veni_counts(latent);
@@ -192,7 +256,7 @@ fn veni_log_radiance_of(index: u32, direction: vec3f) -> vec3f {
         rgb.y += dot(x[c], veni_vectors[veni_output(1u) + c]);
         rgb.z += dot(x[c], veni_vectors[veni_output(2u) + c]);
     }
-    return rgb + veni_log_exposure(latent);
+    return rgb + veni_log_exposure(latent) + veni_lobes(latent, direction);
 }
 
 // x = input bias + encoded direction times the input matrix.

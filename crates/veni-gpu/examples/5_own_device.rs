@@ -2,14 +2,15 @@
 //! handler, cube map, command encoder and submission are all the host's.
 //!
 //! ```sh
-//! cargo run --release -p veni-gpu --example 5_own_device            # --seed 7 --model FILE
+//! cargo run --release -p veni-gpu --example 5_own_device            # --seed 7 | --latent FILE, --model FILE
 //! ```
 //!
 //! Every frame the sky rotates by 30 degrees. One command encoder takes two passes: veni bakes the rotated light into the
 //! host's cube map, and the host's own pass samples that cube map to compute an ambient cube, the irradiance of a
-//! surface towards each of the six axes (G. McTaggart, "Half-Life 2 / Valve Source Shading"). The numbers are compared
-//! with the same sums over the field on the CPU, and after 90 degrees each face of the cube map must hold the texels
-//! of its neighbour.
+//! surface towards each of the six axes (G. McTaggart, "Half-Life 2 / Valve Source Shading"). The sun and other compact lights
+//! of the code are lights of the host's own, as in any rasteriser: a thousand samples would miss a sun or take it for many. The
+//! cube map is without them, and the host adds their irradiance. The numbers are compared with the same sums over the
+//! field on the CPU, and after 90 degrees each face of the cube map must hold the texels of its neighbour.
 
 use std::f64::consts::TAU;
 use std::io::Write;
@@ -21,6 +22,7 @@ use veni_gpu::wgpu::{self, BufferUsages, TextureUsages};
 use veni_gpu::{Bake, GpuDecoder, read_back};
 use veni_light::field::Field;
 use veni_light::latent::Latent;
+use veni_light::light::Lights;
 use veni_light::model::Model;
 use veni_light::sphere::Frame;
 
@@ -37,6 +39,8 @@ const AMBIENT_CUBE: &str = "
 @group(0) @binding(0) var sky: texture_cube<f32>;
 @group(0) @binding(1) var smooth_sampler: sampler;
 @group(0) @binding(2) var<storage, read_write> irradiance: array<vec4f>;
+// The compact lights: direction, then irradiance at normal incidence
+@group(0) @binding(3) var<uniform> lights: array<vec4f, 16>;
 
 const DIRECTIONS: u32 = 1024u;
 var<workgroup> sums: array<vec3f, 64>;
@@ -67,13 +71,18 @@ fn ambient_cube(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
         for (var i = 1u; i < 64u; i++) {
             sum += sums[i];
         }
-        irradiance[group.x] = vec4f(sum * 3.1415927 / f32(DIRECTIONS), 1.0);
+        var all = sum * 3.1415927 / f32(DIRECTIONS);
+        let normal = around(group.x, vec2f(0.0, 1.0), vec2f(0.0, 1.0));
+        for (var m = 0u; m < 16u; m += 2u) {
+            all += lights[m + 1u].xyz * max(dot(normal, lights[m].xyz), 0.0);
+        }
+        irradiance[group.x] = vec4f(all, 1.0);
     }
 }
 ";
 
 fn main() -> Result<()> {
-    let (model, seed) = arguments()?;
+    let (model, sky) = arguments()?;
     let model = Model::load(&model)?;
 
     // The host's world: default limits, no optional features, and a handler that must never hear of anything, because
@@ -103,11 +112,14 @@ fn main() -> Result<()> {
     let host = Host::new(&device, &cube);
 
     // veni's part: the weights once, the latent once; both stay where they are from here on
-    let latent = Latent::from_seed(&model.prior(), seed);
+    let latent = match sky {
+        Sky::Seed(seed) => Latent::from_seed(&model.prior(), seed),
+        Sky::File(path) => Latent::load(path)?,
+    };
     let decoder = GpuDecoder::new(&device, &model)?;
     let latents = decoder.condition(&queue, &latent)?;
     // the host draws in glTF's frame, y up; its lookup vectors then need no conversion
-    let bake = Bake::cube(&cube).frame(Frame::Gltf);
+    let bake = Bake::cube(&cube).frame(Frame::Gltf).without_lights();
     // compiles now instead of in the first frame
     decoder.prepare(&latents, &bake)?;
 
@@ -116,8 +128,9 @@ fn main() -> Result<()> {
     let (mut worst, mut unrotated) = (0f32, Vec::new());
     for step in 0..=3 {
         let angle = TAU / 12.0 * f64::from(step);
-        // a few kilobytes into the same buffer
+        // a few kilobytes into the same buffer, and the lights, which rotate with the rest
         decoder.update(&queue, &latents, 0, &[latent.rotated(angle)])?;
+        host.set_lights(&queue, field.rotated(angle).lights());
 
         // one encoder: the light, then what the host does with it; one submission, by the host
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -169,6 +182,7 @@ struct Host {
     pipeline: wgpu::ComputePipeline,
     group: wgpu::BindGroup,
     irradiance: wgpu::Buffer,
+    lights: wgpu::Buffer,
 }
 
 impl Host {
@@ -191,6 +205,12 @@ impl Host {
             usage: BufferUsages::STORAGE | BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
+        let lights = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("lights"),
+            size: 32 * Lights::MOST as u64,
+            usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
         let view = cube.create_view(&wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::Cube),
             ..wgpu::TextureViewDescriptor::default()
@@ -204,6 +224,7 @@ impl Host {
             wgpu::BindingResource::TextureView(&view),
             wgpu::BindingResource::Sampler(&sampler),
             irradiance.as_entire_binding(),
+            lights.as_entire_binding(),
         ];
         let entries = (0..).zip(resources);
         let entries: Vec<_> =
@@ -213,7 +234,20 @@ impl Host {
             layout: &pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
-        Self { pipeline, group, irradiance }
+        Self { pipeline, group, irradiance, lights }
+    }
+
+    /// The lights as the shader reads them, in glTF's frame; the rest is black.
+    fn set_lights(&self, queue: &wgpu::Queue, lights: &Lights) {
+        let mut words = [[0.0; 4]; 2 * Lights::MOST];
+        for (words, light) in words.as_chunks_mut::<2>().0.iter_mut().zip(lights.iter()) {
+            // of what a surface receives that a point would send, a disc of radius r sends cos²(r/2)
+            let seen = (0.5 * light.radius).cos().powi(2);
+            let [r, g, b] = light.irradiance.map(|e| e * seen);
+            let [x, y, z] = Frame::Gltf.from_native(light.direction);
+            *words = [[x, y, z, 0.0], [r, g, b, 0.0]];
+        }
+        queue.write_buffer(&self.lights, 0, bytemuck::cast_slice(&words));
     }
 
     fn ambient_cube(&self, encoder: &mut wgpu::CommandEncoder) {
@@ -224,14 +258,22 @@ impl Host {
     }
 }
 
-/// What the shader computes, from the field itself: no cube map, no half precision.
+/// What the shader computes, from the field itself: no cube map, no half precision; its lights by their irradiance.
 fn ambient_cube(field: &Field) -> Vec<[f32; 3]> {
     let mut radiance = vec![[0.0; 3]; DIRECTIONS as usize];
+    let (lights, field) = (field.lights(), field.without_lights());
     let of = |axis| {
         let directions: Vec<_> = (0..DIRECTIONS).map(|i| Frame::Gltf.to_native(direction(axis, i))).collect();
         field.radiance_batch(&directions, &mut radiance);
         let sum = |channel: usize| radiance.iter().map(|rgb| f64::from(rgb[channel])).sum::<f64>();
-        [0, 1, 2].map(|channel| (sum(channel) * TAU / 2.0 / f64::from(DIRECTIONS)) as f32)
+        let normal = Frame::Gltf.to_native(towards(axis, [1.0, 0.0, 0.0]));
+        lights.iter().fold(
+            [0, 1, 2].map(|channel| (sum(channel) * TAU / 2.0 / f64::from(DIRECTIONS)) as f32),
+            |sum, light| {
+                let more = light.irradiance_on(normal);
+                [0, 1, 2].map(|c| sum[c] + more[c])
+            },
+        )
     };
     (0..6).map(of).collect()
 }
@@ -240,9 +282,13 @@ fn ambient_cube(field: &Field) -> Vec<[f32; 3]> {
 fn direction(axis: usize, i: u32) -> [f32; 3] {
     let z2 = (f64::from(i) + 0.5) / f64::from(DIRECTIONS);
     let (sin, cos) = (TAU * (f64::from(i) * 0.618_033_988_75).fract()).sin_cos();
-    let sign = if axis % 2 == 1 { -1.0 } else { 1.0 };
     let r = (1.0 - z2).sqrt();
-    let [x, y, z] = [sign * z2.sqrt(), r * cos, r * sin].map(|v| v as f32);
+    towards(axis, [z2.sqrt(), r * cos, r * sin].map(|v| v as f32))
+}
+
+/// A vector whose first component is along an axis.
+fn towards(axis: usize, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    let x = if axis % 2 == 1 { -x } else { x };
     match axis / 2 {
         0 => [x, y, z],
         1 => [z, x, y],
@@ -257,19 +303,30 @@ fn largest_difference(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     differences.fold(0.0, |worst, d| if d.is_nan() { f32::INFINITY } else { d.max(worst) })
 }
 
-fn arguments() -> Result<(PathBuf, u64)> {
+enum Sky {
+    Seed(u64),
+    File(PathBuf),
+}
+
+fn arguments() -> Result<(PathBuf, Sky)> {
     let mut model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../veni-light/assets/veni-27.safetensors");
-    let mut seed = 7;
+    let mut sky = Sky::Seed(7);
     let mut args = std::env::args().skip(1);
     while let Some(name) = args.next() {
         let value = args.next().ok_or_else(|| format!("{name} needs a value"))?;
         match name.as_str() {
             "--model" => model = value.into(),
-            "--seed" => seed = value.parse().map_err(|_| format!("--seed {value}: not a whole number"))?,
+            "--seed" => {
+                sky = Sky::Seed(value.parse().map_err(|_| format!("--seed {value}: not a whole number"))?);
+            }
+            "--latent" => sky = Sky::File(value.into()),
             _ => {
-                return Err(format!("unknown argument {name}; 5_own_device [--seed S] [--model FILE]").into());
+                return Err(format!(
+                    "unknown argument {name}; 5_own_device [--seed S | --latent FILE] [--model FILE]"
+                )
+                .into());
             }
         }
     }
-    Ok((model, seed))
+    Ok((model, sky))
 }

@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         _ => {
             eprintln!(
-                "fn veni_radiance(direction: vec3f) -> vec3f; declare in a group and at bindings of your choice:"
+                "fn veni_radiance, veni_lights (direction: vec3f) -> vec3f; declare in a group and at bindings of your choice:"
             );
             eprint!("{}", shader::field_bindings(0, 0, Weights::Single));
             shader::field(sizes)

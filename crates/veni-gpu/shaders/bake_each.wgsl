@@ -13,5 +13,7 @@ fn veni_bake(
         return;
     }
     let direction = direction_of(request.first + index);
-    store(group.z, index, stored(veni_log_radiance_of(request.latent + group.z, direction)));
+    let latent = request.latent + group.z;
+    let lights = lights_at(latent, request.first + index, direction);
+    store(group.z, index, stored(veni_log_radiance_of(latent, direction), lights));
 }

@@ -23,7 +23,7 @@ fn veni_bake(
     for (var layer = 0u; layer < VENI_LAYERS; layer++) {
         residual_layer(latent, layer, index, &x);
     }
-    write_out(latent, first, group.z, index, &x);
+    write_out(first, group.z, index, &x);
 }
 
 // x = LN(x + W2 max(0, W1 x + b1) + b2) with the norm of the attention before it.
@@ -44,9 +44,10 @@ fn residual_layer(latent: u32, layer: u32, index: u32, x: ptr<function, Tile>) {
     add_vector(x, veni_latents[shift], veni_latents[shift + VENI_GROUPS]);
 }
 
-// Log radiance of the tile, and its storage by the first invocations of each block.
-fn write_out(latent: u32, first: u32, layer: u32, index: u32, x: ptr<function, Tile>) {
+// Radiance of the tile by latent `layer` of the dispatch, and its storage by the first invocations of each block.
+fn write_out(first: u32, layer: u32, index: u32, x: ptr<function, Tile>) {
     let role = role_of(index);
+    let latent = veni_latent(request.latent + layer);
     let exposure = veni_log_exposure(latent);
     var low: array<vec4f, 3>;
     var high: array<vec4f, 3>;
@@ -70,7 +71,9 @@ fn write_out(latent: u32, first: u32, layer: u32, index: u32, x: ptr<function, T
             let lane = i & 3u;
             let rgb = select(vec3f(high[0][lane], high[1][lane], high[2][lane]),
                 vec3f(low[0][lane], low[1][lane], low[2][lane]), i < 4u);
-            store(layer, at, stored(rgb));
+            let direction = tile_directions[4u * quad + lane].xyz;
+            let lights = lights_at(request.latent + layer, request.first + at, direction);
+            store(layer, at, stored(rgb + veni_lobes(latent, direction), lights));
         }
     }
 }

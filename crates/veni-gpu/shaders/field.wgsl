@@ -8,14 +8,14 @@ fn veni_weight(row: u32, column: u32) -> vec4f {
     return vec4f(veni_matrices[row * VENI_COLUMNS + column]);
 }
 
-// Natural log of linear Rec. 709 radiance from the native unit direction (z up), by the first latent.
+// Natural log of linear Rec. 709 radiance from the native unit direction (z up), by the first latent, without its lights.
 fn veni_log_radiance(direction: vec3f) -> vec3f {
     return veni_log_radiance_of(0u, direction);
 }
 
-// Linear Rec. 709 radiance, always finite.
+// Linear Rec. 709 radiance, lights included, always finite.
 fn veni_radiance(direction: vec3f) -> vec3f {
-    return veni_exp(veni_log_radiance_of(0u, direction));
+    return min(veni_exp(veni_log_radiance_of(0u, direction)) + veni_lights(direction), vec3f(3.4028234e38));
 }
 
 // Held within the range of f32, so that finite logarithms give finite light.
@@ -23,7 +23,7 @@ fn veni_exp(log_radiance: vec3f) -> vec3f {
     return exp(clamp(log_radiance, vec3f(-87.0), vec3f(88.5)));
 }
 
-// The same by any of the latents that were uploaded together.
+// Log radiance by any of the latents that were uploaded together.
 fn veni_log_radiance_of(index: u32, direction: vec3f) -> vec3f {
     let latent = veni_latent(index);
     let counts = veni_counts(latent);
@@ -56,7 +56,7 @@ fn veni_log_radiance_of(index: u32, direction: vec3f) -> vec3f {
         rgb.y += dot(x[c], veni_vectors[veni_output(1u) + c]);
         rgb.z += dot(x[c], veni_vectors[veni_output(2u) + c]);
     }
-    return rgb + veni_log_exposure(latent);
+    return rgb + veni_log_exposure(latent) + veni_lobes(latent, direction);
 }
 
 // x = input bias + encoded direction times the input matrix.

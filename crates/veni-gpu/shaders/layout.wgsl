@@ -5,7 +5,10 @@
 //                  then per layer W1 and W2, one row per input feature
 //   veni_vectors   per layer gamma1, beta1, b1, b2, gamma2; then the three output rows and the output bias
 //   veni_latents   per latent: bias of the input projection with the first layer's attention, per layer beta2
-//                  with the next layer's attention, N x (x, y high parts, x, y low parts), (log exposure, VENI_COLUMNS, VENI_LAYERS, N + 2)
+//                  with the next layer's attention, N x (x, y high parts, x, y low parts), (log exposure, VENI_COLUMNS, VENI_LAYERS, N + 2);
+//                  VENI_MAX_LIGHTS x (direction, extent), (radiance in the middle, -), with their number in the first "-"; an extent
+//                  above 0 is 4 sin^2 (r/2) of a disc of radius r, one below 0 -kappa/2 of a glow;
+//                  VENI_MAX_LOBES x (direction, -sharpness/2), (amplitude, -), with their number in the first "-"
 //
 // The constants VENI_LATENTS (N), VENI_HIDDEN (h), VENI_LAYERS and VENI_COLUMNS are put in front of this file.
 
@@ -39,13 +42,26 @@ fn veni_output(channel: u32) -> u32 {
     return (5u * VENI_LAYERS + channel) * VENI_COLUMNS;
 }
 
+const VENI_MAX_LIGHTS: u32 = 8u;
+const VENI_MAX_LOBES: u32 = 16u;
+
 fn veni_latent(index: u32) -> u32 {
-    return index * (VENI_COLUMNS * (VENI_LAYERS + 1u) + VENI_LATENTS + 1u);
+    return index * (veni_latent_lobes(0u) + 2u * VENI_MAX_LOBES);
 }
 
 // The vectors of a latent whose block begins at `latent`.
 fn veni_latent_vectors(latent: u32) -> u32 {
     return latent + VENI_COLUMNS * (VENI_LAYERS + 1u);
+}
+
+// The lights of a latent whose block begins at `latent`.
+fn veni_latent_lights(latent: u32) -> u32 {
+    return veni_latent_vectors(latent) + VENI_LATENTS + 1u;
+}
+
+// Its lobes.
+fn veni_latent_lobes(latent: u32) -> u32 {
+    return veni_latent_lights(latent) + 2u * VENI_MAX_LIGHTS;
 }
 
 // VENI_COLUMNS, VENI_LAYERS and the number of inputs as data: a loop up to one of them stays a loop. Unrolled, the network

@@ -24,6 +24,10 @@ struct VeniLevel {
 @group(0) @binding(2) var<storage, read> gains: array<f32>;
 @group(0) @binding(3) var<storage, read> coefficients: array<vec4f>;
 @group(0) @binding(4) var target_texture: texture_storage_2d_array<VENI_FORMAT, write>;
+// Lights through the lobe. First, per latent: (where its lights begin, their number, 0, 0). Tables: values at the chords
+// width sinh(k step), k = 0 to 1025, four to a vec4. Per light, as bits: (direction, 1/width), (irradiance, 1/step), (where its table
+// begins, 0, 0, 0). A latent beyond the buffer has none.
+@group(0) @binding(5) var<storage, read> glints: array<vec4u>;
 
 @compute @workgroup_size(8, 8)
 fn veni_level(@builtin(global_invocation_id) id: vec3u) {
@@ -39,7 +43,7 @@ fn veni_level(@builtin(global_invocation_id) id: vec3u) {
         let scale = inverseSqrt(dot(v, v));
         let d = scale * (level.axis_x * v.x + level.axis_y * v.y + level.axis_z * v.z);
         let weight = scale * scale * scale;
-        sum += weight * veni_harmonics(id.z / 6u, d);
+        sum += weight * (veni_harmonics(id.z / 6u, d) + veni_glints(id.z / 6u, d));
         whole += weight;
     }
     // a spectrum cut off may fall below zero by its last waves
@@ -76,4 +80,29 @@ fn veni_harmonics(latent: u32, d: vec3f) -> vec3f {
         diagonal *= -sqrt(f32(2u * m + 3u) / f32(2u * m + 2u));
     }
     return sum;
+}
+
+// The lights of a latent, as the lobe shows them in a unit direction.
+fn veni_glints(latent: u32, d: vec3f) -> vec3f {
+    if latent >= arrayLength(&glints) {
+        return vec3f();
+    }
+    var sum = vec3f();
+    for (var m = 0u; m < glints[latent].y; m++) {
+        let at = glints[latent].x + 3u * m;
+        let light = bitcast<vec4f>(glints[at]);
+        let irradiance = bitcast<vec4f>(glints[at + 1u]);
+        let table = glints[at + 2u].x;
+        let away = d - light.xyz;
+        let chord = light.w * sqrt(dot(away, away));
+        let x = irradiance.w * log(chord + sqrt(chord * chord + 1.0));
+        let low = min(u32(x), 1024u);
+        let value = mix(veni_glint_value(table, low), veni_glint_value(table, low + 1u), x - f32(low));
+        sum += irradiance.xyz * value;
+    }
+    return sum;
+}
+
+fn veni_glint_value(table: u32, k: u32) -> f32 {
+    return bitcast<f32>(glints[table + k / 4u][k % 4u]);
 }

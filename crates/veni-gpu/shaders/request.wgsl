@@ -25,4 +25,8 @@ struct VeniRequest {
     logarithm: u32,
     // Index of this dispatch's first tile
     tile: u32,
+    // Factor of the radiance of lights, 0 to leave them out
+    light_scale: f32,
+    // Glows of an extent not below minus this are smooth within pixels of the grid
+    smoothest: f32,
 }

@@ -19,8 +19,12 @@ struct VeniRings {
 @group(0) @binding(3) var<storage, read> radiance: array<vec4f>;
 // Per latent and ring the orders: cosine part, sine part
 @group(0) @binding(4) var<storage, read_write> waves: array<vec4f>;
-// Per latent c_lm at l l + l + m
-@group(0) @binding(5) var<storage, read_write> coefficients: array<vec4f>;
+// Per latent c_lm at l l + l + m, without lights
+@group(0) @binding(5) var<storage, read_write> rest: array<vec4f>;
+// The same of the lights alone, in closed form; or one 0, where there are none
+@group(0) @binding(6) var<storage, read> lights: array<vec4f>;
+// Both together
+@group(0) @binding(7) var<storage, read_write> coefficients: array<vec4f>;
 
 @compute @workgroup_size(64)
 fn veni_waves(@builtin(global_invocation_id) id: vec3u) {
@@ -65,5 +69,10 @@ fn veni_degrees(@builtin(global_invocation_id) id: vec3u) {
         let at = 2u * ((id.z * rings.rings + ring) * orders + order) + select(0u, 1u, odd);
         sum += legendre[row + ring] * waves[at].xyz;
     }
-    coefficients[id.z * orders * orders + id.x] = vec4f(sum, 0.0);
+    let at = id.z * orders * orders + id.x;
+    rest[at] = vec4f(sum, 0.0);
+    if at < arrayLength(&lights) {
+        sum += lights[at].xyz;
+    }
+    coefficients[at] = vec4f(sum, 0.0);
 }

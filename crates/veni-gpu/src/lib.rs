@@ -3,7 +3,8 @@
 //! A [`GpuDecoder`] holds a model's weights on the host's `wgpu::Device`.
 //! [`condition`](decoder::GpuDecoder::condition) folds a latent on the CPU and uploads a few kilobytes;
 //! [`bake`](decoder::GpuDecoder::bake) records a compute pass into the host's command encoder: a panorama, cube
-//! faces, or radiances for a buffer of directions. Nothing here creates an instance, submits, or installs an error
+//! faces, or radiances for a buffer of directions, with the compact lights and lobes of the latent, or without its lights
+//! for hosts that draw them as their own. Nothing here creates an instance, submits, or installs an error
 //! handler, except the conveniences in [`read_back`], [`adapters`] and [`probe`], which say so.
 //!
 //! A [`GpuLight`] holds a light's alias table and radiance for `veni_sample_light` and its kin, which a path tracer's own shader

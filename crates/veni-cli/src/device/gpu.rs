@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use veni_gpu::adapters::{self, Found, Opened};
 use veni_gpu::read_back::{self, Picture};
 use veni_gpu::shader::Grid;
@@ -108,9 +108,15 @@ impl Gpu {
         &self.0.name
     }
 
-    pub(super) fn condition(&self, latent: &Latent) -> veni_gpu::Result<Conditioned> {
-        let vectors = Latent { lights: Lights::default(), ..latent.clone() };
-        let latents = self.0.decoder.condition(&self.0.opened.queue, &vectors)?;
+    /// The device decodes vectors and lobes; lights, of which a code may have more than a shader has room for, are added here.
+    pub(super) fn condition(&self, latent: &Latent) -> Result<Conditioned> {
+        let dark = Latent { lights: Lights::default(), ..latent.clone() };
+        let latents = self.0.decoder.condition(&self.0.opened.queue, &dark).map_err(|error| match error {
+            veni_gpu::Error::Light(veni_light::Error::Unsupported { message, .. }) => {
+                anyhow!("{message}; use --device cpu")
+            }
+            error => error.into(),
+        })?;
         let lights = latent.lights.scaled(latent.log_exposure.exp());
         Ok(Conditioned { gpu: Arc::clone(&self.0), latents, lights })
     }

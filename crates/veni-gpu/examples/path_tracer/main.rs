@@ -9,8 +9,9 @@
 //! What a renderer takes over is in `tracer.rs`: the texts, their buffers, nothing else. The rest is an ordinary path tracer
 //! (`tracer.wgsl`):
 //!
-//! - **The sky** is a function: `veni_radiance(direction)`, the network itself, which no environment map stands for, or
-//!   `veni_light_radiance(direction)` of a panorama whose sun was made a disc of its own. It is asked once per path.
+//! - **The sky** is a function: `veni_radiance(direction)`, the network itself with the lights of the code, which no environment map
+//!   stands for, or `veni_light_radiance(direction)` of a panorama whose sun was made a disc of its own. It is asked once per path,
+//!   for the sun and all else, so that the sun is counted once; `veni_sample_light` only says where to look.
 //! - **Diffuse surfaces** draw directions by the cosine (`--sampler bsdf`), by `veni_sample_light` (`light`), or half of the
 //!   time by either, with the mean of both densities (`mis`, the balance heuristic with one sample; the light is then sampled by
 //!   what exceeds its mean). Light alone is right only where no direction is black.
@@ -36,7 +37,7 @@ use veni_gpu::shader::{LightDensity, pack_light};
 use veni_gpu::{GpuDecoder, GpuLight};
 use veni_image::{Panorama, luminance};
 use veni_light::latent::Latent;
-use veni_light::light::{EnvironmentMap, Light, LightOptions};
+use veni_light::light::{CompactLight, EnvironmentMap, Kind, Light, Lights};
 use veni_light::model::Model;
 use veni_light::sphere::Equirect;
 
@@ -45,7 +46,7 @@ use tracer::{Sky, Tracer};
 
 pub(crate) type Result<T, E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
-/// What the field's sampler is made of. The field is smooth: its pixels hold what a direction needs.
+/// What the field's sampler is made of, beside the sun. The field is smooth: its pixels hold what a direction needs.
 const GRID: Equirect = Equirect { width: 256, height: 128 };
 /// Where most light comes from, degrees counter-clockwise from +x, where the camera looks: from the left, slightly
 /// ahead.
@@ -91,12 +92,20 @@ fn sky(opened: &Opened, options: &Options) -> Result<Sky> {
         }
         None => {
             let model = Model::load(&options.model)?;
-            let latent = Latent::from_seed(&model.prior(), options.seed);
-            let pixels = model.decoder()?.condition(&latent)?.bake(GRID);
-            let angle = key_rotation(EnvironmentMap::new(GRID, &pixels)?);
-            // a latent's sun is a wide lobe: the map holds it better than a disc
-            let whole = LightOptions { lights: 0, ..LightOptions::default() };
-            (whole.of_pixels(GRID, pixels)?, angle, Some((model, latent)))
+            let latent = match &options.latent {
+                Some(path) => Latent::load(path)?,
+                None => Latent::from_seed(&model.prior(), options.seed),
+            };
+            let field = model.decoder()?.condition(&latent)?;
+            let angle = key_rotation(EnvironmentMap::new(GRID, &field.bake(GRID))?);
+            // The sun of the code is drawn by its disc, which `veni_radiance` shows where `veni_sample_light` aims. The map holds the
+            // rest: lamps, and glows better than discs.
+            let is_sun =
+                |light: &CompactLight| light.kind() == Kind::Disc && field.lights().sun() == Some(light);
+            let (sun, others): (Vec<_>, Vec<_>) = field.lights().iter().copied().partition(is_sun);
+            let rest = field.with_lights(Lights::new(None, others)).bake(GRID);
+            let light = Light::of_parts(EnvironmentMap::new(GRID, &rest)?, sun.first().copied());
+            (light, angle, Some((model, latent)))
         }
     };
     let angle = options.turn.map_or(angle, f64::to_radians);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::Result;
 
-const USAGE: &str = "path_tracer [--seed S | --panorama FILE] [--sampler bsdf|light|mis | --compare] [--size WxH] [--samples N] \
+const USAGE: &str = "path_tracer [--seed S | --latent FILE | --panorama FILE] [--sampler bsdf|light|mis | --compare] [--size WxH] [--samples N] \
                      [--turn DEGREES] [--model FILE] [-o FILE.png]";
 
 /// How diffuse surfaces draw directions; the numbers stand in `tracer.wgsl`.
@@ -25,6 +25,7 @@ impl Strategy {
 
 pub(crate) struct Options {
     pub(crate) seed: u64,
+    pub(crate) latent: Option<PathBuf>,
     pub(crate) panorama: Option<PathBuf>,
     pub(crate) strategy: Strategy,
     pub(crate) compare: bool,
@@ -39,6 +40,7 @@ impl Options {
     pub(crate) fn from_args() -> Result<Self> {
         let mut options = Self {
             seed: 7,
+            latent: None,
             panorama: None,
             strategy: Strategy::Mis,
             compare: false,
@@ -48,7 +50,17 @@ impl Options {
             model: Path::new(env!("CARGO_MANIFEST_DIR")).join("../veni-light/assets/veni-27.safetensors"),
             out: PathBuf::from("path_tracer.png"),
         };
-        let names = ["--seed", "--panorama", "--sampler", "--size", "--samples", "--turn", "--model", "-o"];
+        let names = [
+            "--seed",
+            "--latent",
+            "--panorama",
+            "--sampler",
+            "--size",
+            "--samples",
+            "--turn",
+            "--model",
+            "-o",
+        ];
         let mut args = std::env::args().skip(1);
         while let Some(name) = args.next() {
             if name == "--compare" {
@@ -62,6 +74,7 @@ impl Options {
             let wrong = || format!("{name} {value}: not of the right form; {USAGE}");
             match name.as_str() {
                 "--seed" => options.seed = value.parse().map_err(|_| wrong())?,
+                "--latent" => options.latent = Some(value.into()),
                 "--panorama" => options.panorama = Some(value.into()),
                 "--sampler" => {
                     let found = Strategy::ALL.into_iter().find(|s| s.name() == value);

@@ -7,10 +7,10 @@ use wgpu::{
 
 use super::target::Target;
 use super::{Bake, GpuDecoder, GpuLatents};
-use crate::buffers::filled;
+use crate::buffers::{filled, storage};
 use crate::error::{Error, Result};
 use crate::scope::guarded;
-use crate::shader::{Directions, Request, Store, Variant};
+use crate::shader::{Directions, Request, Store, Variant, pack_gains};
 
 impl GpuDecoder {
     /// Records one compute pass that bakes all latents of `latents` into the target. Nothing is submitted; the host
@@ -34,6 +34,10 @@ impl GpuDecoder {
         let stride = (Request::BYTES as u32).next_multiple_of(alignment);
         let requests = self.requests(&dispatches, stride)?;
         let view = self.view(&bake.target)?;
+        let sixth = match &bake.target {
+            Target::List { directions, .. } => (*directions).clone(),
+            _ => self.gains(&request, latents)?,
+        };
         let target = match (&bake.target, &view) {
             (_, Some(view)) => BindingResource::TextureView(view),
             (Target::Pixels { buffer, .. } | Target::List { buffer, .. }, _) => buffer.as_entire_binding(),
@@ -44,16 +48,14 @@ impl GpuDecoder {
             offset: 0,
             size: BufferSize::new(Request::BYTES as u64),
         });
-        let mut resources = vec![
+        let resources = [
             self.matrices.as_entire_binding(),
             self.vectors.as_entire_binding(),
             latents.buffer.as_entire_binding(),
             request,
             target,
+            sixth.as_entire_binding(),
         ];
-        if let Target::List { directions, .. } = &bake.target {
-            resources.push(directions.as_entire_binding());
-        }
         let entries: Vec<_> =
             (0..).zip(resources).map(|(binding, resource)| BindGroupEntry { binding, resource }).collect();
         let group = guarded(&self.device, "bindings of a bake", || {
@@ -95,6 +97,16 @@ impl GpuDecoder {
             bytes.resize(bytes.len().next_multiple_of(stride as usize), 0);
         }
         filled(&self.device, "veni requests", BufferUsages::UNIFORM, &bytes)
+    }
+
+    /// What the lights add to the pixels of a grid.
+    fn gains(&self, request: &Request, latents: &GpuLatents) -> Result<Buffer> {
+        let gains = latents.with_lights(|lights| pack_gains(request, lights));
+        match &gains[..] {
+            // nothing: no buffer is made
+            [_] => Ok(self.no_gains.clone()),
+            _ => storage(&self.device, "veni lights on pixels", bytemuck::cast_slice(&gains)),
+        }
     }
 
     fn view(&self, target: &Target<'_>) -> Result<Option<TextureView>> {

@@ -1,6 +1,9 @@
 //! Latents on the device, conditioned.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use veni_light::latent::Latent;
+use veni_light::light::Lights;
 use wgpu::{Buffer, BufferDescriptor, BufferUsages, Queue};
 
 use super::GpuDecoder;
@@ -17,6 +20,8 @@ pub struct GpuLatents {
     pub(super) buffer: Buffer,
     pub(super) count: u32,
     pub(super) model: String,
+    /// In units of radiance, one for each: what the host computes with areas needs them again.
+    lights: Arc<Mutex<Vec<Lights>>>,
 }
 
 impl GpuLatents {
@@ -35,6 +40,13 @@ impl GpuLatents {
         Self { count: 1, ..self.clone() }
     }
 
+    /// Looks at the lights of all of them, as they are now.
+    pub(crate) fn with_lights<T>(&self, look: impl FnOnce(&[Lights]) -> T) -> T {
+        // a panic elsewhere leaves them as they were
+        let all = self.lights.lock().unwrap_or_else(PoisonError::into_inner);
+        look(&all[..self.count as usize])
+    }
+
     /// `veni_latents`, for a shader that includes [`field`](crate::shader::field).
     pub fn buffer(&self) -> &Buffer {
         &self.buffer
@@ -45,8 +57,8 @@ impl GpuDecoder {
     /// Folds a latent on the CPU (microseconds) and uploads it: a few kilobytes.
     ///
     /// # Errors
-    /// [`Error::Light`] if the latent does not fit the model, is not finite, or has lights or lobes, which the shaders do not draw;
-    /// [`Error::Gpu`] if there is no memory.
+    /// [`Error::Light`] if the latent does not fit the model, is not finite, or has more than 8 lights or 16 lobes; [`Error::Gpu`] if
+    /// there is no memory.
     pub fn condition(&self, queue: &Queue, latent: &Latent) -> Result<GpuLatents> {
         self.condition_batch(queue, std::slice::from_ref(latent))
     }
@@ -63,7 +75,7 @@ impl GpuDecoder {
                 "a batch of {count} latents: it must have from 1 to {MAX_BATCH}"
             )));
         }
-        let data = self.fold(latents)?;
+        let (data, lights) = self.fold(latents)?;
         let size = 4 * data.len() as u64;
         let most = self.device.limits().max_storage_buffer_binding_size;
         if size > most {
@@ -79,13 +91,14 @@ impl GpuDecoder {
             mapped_at_creation: false,
         };
         let buffer = guarded(&self.device, "veni latents", || self.device.create_buffer(&descriptor))?;
-        let latents = GpuLatents { buffer, count: count as u32, model: self.model.clone() };
+        let lights = Arc::new(Mutex::new(lights));
+        let latents = GpuLatents { buffer, count: count as u32, model: self.model.clone(), lights };
         self.write(queue, &latents, 0, &data)?;
         Ok(latents)
     }
 
     /// Replaces latents from the `first` on, in the same memory: for light that changes every frame. Takes effect for
-    /// what is submitted after it.
+    /// what is submitted after it; of their lights, what is recorded after it.
     ///
     /// # Errors
     /// [`Error::Light`] as for [`GpuDecoder::condition`]; [`Error::Invalid`] if the batch does not hold them or is
@@ -99,17 +112,23 @@ impl GpuDecoder {
                 into.count
             )));
         }
-        let data = self.fold(latents)?;
+        let (data, lights) = self.fold(latents)?;
         let offset = 16 * self.sizes.latent_stride() as u64 * u64::from(first);
-        self.write(queue, into, offset, &data)
+        self.write(queue, into, offset, &data)?;
+        let mut all = into.lights.lock().unwrap_or_else(PoisonError::into_inner);
+        all[first as usize..][..count].clone_from_slice(&lights);
+        Ok(())
     }
 
-    fn fold(&self, latents: &[Latent]) -> Result<Vec<f32>> {
+    fn fold(&self, latents: &[Latent]) -> Result<(Vec<f32>, Vec<Lights>)> {
         let mut data = Vec::with_capacity(4 * self.sizes.latent_stride() * latents.len());
+        let mut lights = Vec::with_capacity(latents.len());
         for latent in latents {
-            pack_latent(self.sizes, &self.decoder.condition(latent)?, &mut data)?;
+            let field = self.decoder.condition(latent)?;
+            pack_latent(self.sizes, &field, &mut data)?;
+            lights.push(field.lights().clone());
         }
-        Ok(data)
+        Ok((data, lights))
     }
 
     fn write(&self, queue: &Queue, into: &GpuLatents, offset: u64, data: &[f32]) -> Result<()> {

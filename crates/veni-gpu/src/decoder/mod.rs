@@ -46,6 +46,8 @@ pub struct GpuDecoder {
     weights: Weights,
     matrices: Buffer,
     vectors: Buffer,
+    /// The list of a grid without lights.
+    no_gains: Buffer,
     pipelines: Pipelines,
 }
 
@@ -76,6 +78,7 @@ impl GpuDecoder {
         Ok(Self {
             matrices: storage(device, "veni matrices", bytes)?,
             vectors: storage(device, "veni vectors", bytemuck::cast_slice(&packed.vectors))?,
+            no_gains: storage(device, "veni lights on pixels", &[0; 16])?,
             pipelines: Pipelines::default(),
             device: device.clone(),
             decoder,

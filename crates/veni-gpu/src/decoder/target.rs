@@ -10,6 +10,8 @@ use crate::shader::{Directions, Grid, Request, Store, TexelFormat};
 
 /// Description of a bake: make it by one of its constructors, change it by its methods, and hand it to
 /// [`GpuDecoder::bake`](super::GpuDecoder::bake).
+///
+/// Pixels of panoramas and cube faces hold the part of a light that lies in them, so that its energy is right at any resolution.
 #[derive(Clone, Copy, Debug)]
 pub struct Bake<'a> {
     pub(super) target: Target<'a>,
@@ -17,6 +19,7 @@ pub struct Bake<'a> {
     pub(super) rotation: f64,
     pub(super) stops: f32,
     pub(super) logarithm: bool,
+    pub(super) lights: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -47,14 +50,14 @@ impl<'a> Bake<'a> {
         Self::new(Target::Pixels { buffer, grid, first, count: count.saturating_mul(width) })
     }
 
-    /// Radiance for `count` unit directions: a storage buffer of `vec4f` (the fourth component is ignored) to a
+    /// Radiance for `count` unit directions, of lights what is seen there: a storage buffer of `vec4f` (the fourth component is ignored) to a
     /// storage buffer of `vec4f` per latent and direction, which must be another one.
     pub fn directions(directions: &'a Buffer, radiance: &'a Buffer, count: u32) -> Self {
         Self::new(Target::List { directions, buffer: radiance, count })
     }
 
     fn new(target: Target<'a>) -> Self {
-        Self { target, frame: Frame::default(), rotation: 0.0, stops: 0.0, logarithm: false }
+        Self { target, frame: Frame::default(), rotation: 0.0, stops: 0.0, logarithm: false, lights: true }
     }
 
     /// The frame whose axes name cube faces and directions. Panoramas do not depend on it.
@@ -75,10 +78,17 @@ impl<'a> Bake<'a> {
         Self { stops, ..self }
     }
 
-    /// Natural log of radiance, the network's own output, instead of radiance.
+    /// Natural log of radiance, the network's own output with its lobes, instead of radiance. Lights are not in it.
     #[must_use]
     pub fn logarithm(self) -> Self {
         Self { logarithm: true, ..self }
+    }
+
+    /// Leaves the compact lights of the latents out: for hosts that draw the sun as a light of its own
+    /// ([`Field::lights`](veni_light::field::Field::lights) has it).
+    #[must_use]
+    pub fn without_lights(self) -> Self {
+        Self { lights: false, ..self }
     }
 
     /// The kernel's ends and the request, once the target is known to fit `latents` latents.
@@ -125,6 +135,7 @@ impl<'a> Bake<'a> {
             log_exposure: self.stops * std::f32::consts::LN_2,
             largest,
             logarithm: self.logarithm,
+            lights: self.lights,
             first,
             count,
             latent: 0,

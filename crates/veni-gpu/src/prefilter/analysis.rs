@@ -4,9 +4,11 @@ use wgpu::{Buffer, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassDe
 
 use super::layout::group;
 use super::{GpuPrefilter, Tables};
+use crate::buffers::storage;
 use crate::decoder::{Bake, GpuDecoder, GpuLatents};
 use crate::error::{Error, Result};
 use crate::scope::guarded;
+use crate::shader::pack_light_harmonics;
 
 /// Workspace on the device: the harmonics of one or more latents, and what finding them takes. Make it once, for every frame.
 #[derive(Clone, Debug)]
@@ -15,6 +17,7 @@ pub struct GpuHarmonics {
     degree: usize,
     radiance: Buffer,
     waves: Buffer,
+    rest: Buffer,
     coefficients: Buffer,
 }
 
@@ -29,11 +32,16 @@ impl GpuHarmonics {
         self.count == 0
     }
 
-    /// The coefficients: per latent (L + 1)² vec4f (R, G, B, 0), c_lm of radiance at l² + l + m, native, with the sign (−1)^m, as
+    /// The coefficients, lights included: per latent (L + 1)² vec4f (R, G, B, 0), c_lm of radiance at l² + l + m, native, with the sign (−1)^m, as
     /// [`Sh::coefficients`](veni_light::light::Sh::coefficients). The first nine are those of most engines. Usage `STORAGE` and
     /// `COPY_SRC`.
     pub fn coefficients(&self) -> &Buffer {
         &self.coefficients
+    }
+
+    /// The same without the lights, for hosts that draw the sun as a light of its own.
+    pub fn rest(&self) -> &Buffer {
+        &self.rest
     }
 
     /// L.
@@ -71,12 +79,13 @@ impl GpuPrefilter {
             degree: self.tables.degree,
             radiance: buffer("veni ring radiance", u64::from(self.tables.count), usage)?,
             waves: buffer("veni waves", waves, usage)?,
+            rest: buffer("veni harmonics of the rest", coefficients, usage | BufferUsages::COPY_SRC)?,
             coefficients: buffer("veni harmonics", coefficients, usage | BufferUsages::COPY_SRC)?,
         })
     }
 
-    /// Records what fills `into` with the harmonics of `latents`: their radiance on rings, and two passes of sums. Nothing is
-    /// submitted.
+    /// Records what fills `into` with the harmonics of `latents`: their radiance on rings, and two passes of sums; those of their
+    /// lights are added in closed form. Nothing is submitted.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the workspace is of fewer latents or another degree, or the latents are another model's;
@@ -90,12 +99,14 @@ impl GpuPrefilter {
     ) -> Result<()> {
         self.check(latents, into)?;
         let Tables { uniform, phases, legendre, directions, count, groups, .. } = &self.tables;
-        let buffers = [uniform, phases, legendre, &into.radiance, &into.waves, &into.coefficients];
+        let lights = self.light_harmonics(latents)?;
+        let GpuHarmonics { radiance, waves, rest, coefficients, .. } = into;
+        let buffers = [uniform, phases, legendre, radiance, waves, rest, &lights, coefficients];
         let group = guarded(&self.device, "bindings of harmonics", || {
             let resources = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
             group(&self.device, &self.layout, resources)
         })?;
-        decoder.bake(encoder, latents, &Bake::directions(directions, &into.radiance, *count))?;
+        decoder.bake(encoder, latents, &Bake::directions(directions, radiance, *count).without_lights())?;
         let descriptor = ComputePassDescriptor { label: Some("veni harmonics"), timestamp_writes: None };
         let mut pass = encoder.begin_compute_pass(&descriptor);
         pass.set_bind_group(0, &group, &[]);
@@ -104,6 +115,15 @@ impl GpuPrefilter {
             pass.dispatch_workgroups(*groups, 1, latents.len());
         }
         Ok(())
+    }
+
+    fn light_harmonics(&self, latents: &GpuLatents) -> Result<Buffer> {
+        let packed = latents.with_lights(|lights| pack_light_harmonics(self.degree(), lights));
+        match &packed[..] {
+            // no lights: no buffer is made
+            [_] => Ok(self.no_lights.clone()),
+            _ => storage(&self.device, "veni harmonics of lights", bytemuck::cast_slice(&packed)),
+        }
     }
 
     pub(super) fn check(&self, latents: &GpuLatents, harmonics: &GpuHarmonics) -> Result<()> {

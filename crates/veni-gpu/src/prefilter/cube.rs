@@ -16,13 +16,14 @@ pub struct PrefilteredCube<'a> {
     law: Law,
     pub(super) frame: Frame,
     pub(super) rotation: f64,
+    pub(super) lights: bool,
 }
 
 impl<'a> PrefilteredCube<'a> {
     /// All mip levels of a storage texture: `rgba32float` or `rgba16float`, 2D, square, six layers per latent (+X −X +Y −Y +Z −Z of
     /// the frame), usage `STORAGE_BINDING`. `law` says which roughness a level has.
     pub fn new(texture: &'a Texture, law: Law) -> Self {
-        Self { texture, law, frame: Frame::default(), rotation: 0.0 }
+        Self { texture, law, frame: Frame::default(), rotation: 0.0, lights: true }
     }
 
     /// The frame whose axes name the faces.
@@ -38,9 +39,16 @@ impl<'a> PrefilteredCube<'a> {
         Self { rotation: radians, ..self }
     }
 
+    /// Leaves the compact lights of the latents out, for hosts that draw the sun as a light of its own.
+    #[must_use]
+    pub fn without_lights(self) -> Self {
+        Self { lights: false, ..self }
+    }
+
     /// The first level, which is the field itself.
     pub(super) fn first(&self) -> Bake<'a> {
-        Bake::cube(self.texture).frame(self.frame).rotate(self.rotation)
+        let bake = Bake::cube(self.texture).frame(self.frame).rotate(self.rotation);
+        if self.lights { bake } else { bake.without_lights() }
     }
 
     /// Its chain of levels and its texels, once the texture is known to fit.

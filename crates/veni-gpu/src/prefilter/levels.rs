@@ -16,7 +16,7 @@ use crate::buffers::{filled, storage};
 use crate::decoder::{GpuDecoder, GpuLatents};
 use crate::error::{Error, Result};
 use crate::scope::guarded;
-use crate::shader::{LEVEL_ENTRY_POINT, Level, TexelFormat, level_source};
+use crate::shader::{Glints, LEVEL_ENTRY_POINT, Level, TexelFormat, level_source};
 
 /// Most layers that a dispatch covers: WebGPU's limit on its third dimension.
 const MAX_LAYERS: u32 = 65_535;
@@ -42,6 +42,8 @@ struct Kernel {
 struct Gains {
     buffer: Buffer,
     levels: Vec<[u32; 2]>,
+    /// What the lobes make of lights.
+    glints: Mutex<Vec<Glints>>,
 }
 
 impl GpuPrefilter {
@@ -49,7 +51,8 @@ impl GpuPrefilter {
     /// [`GpuPrefilter::analyse`] has filled. Nothing is submitted.
     ///
     /// Level k holds L convolved with the GGX lobe of its roughness, seen along its own normal, as
-    /// [`Prefilter`](veni_light::light::Prefilter) on the CPU, up to the largest degree of the harmonics.
+    /// [`Prefilter`](veni_light::light::Prefilter) on the CPU, up to the largest degree of the harmonics; lights, to which this limit
+    /// does not apply, as the lobe shows them.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the texture does not fit (format, usage, size, layers), the harmonics are of another degree or of fewer
@@ -72,7 +75,8 @@ impl GpuPrefilter {
         let alignment = self.device.limits().min_uniform_buffer_offset_alignment;
         let stride = (Level::BYTES as u32).next_multiple_of(alignment);
         let requests = self.requests(levels, format, &gains, cube, stride)?;
-        let groups = (1..levels.count() as u32).map(|level| {
+        let glints = self.glints(&gains, latents, cube)?;
+        let groups = (1..levels.count() as u32).zip(&glints).map(|(level, glints)| {
             let view = self.view(cube, level)?;
             let uniform =
                 BufferBinding { buffer: &requests, offset: 0, size: BufferSize::new(Level::BYTES as u64) };
@@ -80,8 +84,9 @@ impl GpuPrefilter {
                 BindingResource::Buffer(uniform),
                 self.tables.steps.as_entire_binding(),
                 gains.buffer.as_entire_binding(),
-                harmonics.coefficients().as_entire_binding(),
+                harmonics.rest().as_entire_binding(),
                 BindingResource::TextureView(&view),
+                glints.as_entire_binding(),
             ];
             guarded(&self.device, "bindings of a level", || group(&self.device, &kernel.layout, resources))
         });
@@ -96,6 +101,21 @@ impl GpuPrefilter {
             pass.dispatch_workgroups(across, across, layers);
         }
         Ok(())
+    }
+
+    /// The lights of all levels but the first.
+    fn glints(&self, gains: &Gains, latents: &GpuLatents, cube: &PrefilteredCube<'_>) -> Result<Vec<Buffer>> {
+        // a panic elsewhere leaves tables as they were
+        let mut glints = gains.glints.lock().unwrap_or_else(PoisonError::into_inner);
+        let dark = !cube.lights || latents.with_lights(|all| all.iter().all(|lights| lights.is_empty()));
+        let of_level = |glints: &mut Glints| {
+            if dark {
+                return Ok(self.no_lights.clone());
+            }
+            let packed = latents.with_lights(|lights| glints.pack(lights));
+            storage(&self.device, "veni lights of a level", bytemuck::cast_slice(&packed))
+        };
+        glints.iter_mut().map(of_level).collect()
     }
 
     /// The uniforms of all levels but the first.
@@ -174,7 +194,8 @@ impl Kernel {
             TexelFormat::Rgba16Float => TextureFormat::Rgba16Float,
         };
         let uniform = Access::Uniform { bytes: Level::BYTES as u64, dynamic: true };
-        let accesses = [uniform, Access::Read, Access::Read, Access::Read, Access::Texture(texture)];
+        let (read, texture) = (Access::Read, Access::Texture(texture));
+        let accesses = [uniform, read, read, read, texture, read];
         let layout = layout(device, &accesses);
         let module = module(device, &level_source(format));
         let pipeline = pipeline(device, &layout, &module, LEVEL_ENTRY_POINT);
@@ -192,6 +213,8 @@ impl Gains {
         }
         // a buffer has bytes even where there is nothing to do
         all.resize(all.len().max(1), 0.0);
-        Ok(Self { buffer: storage(device, "veni gains", bytemuck::cast_slice(&all))?, levels })
+        let buffer = storage(device, "veni gains", bytemuck::cast_slice(&all))?;
+        let glints = (1..chain.count()).map(|level| Glints::new(chain.roughness(level))).collect();
+        Ok(Self { buffer, levels, glints: Mutex::new(glints) })
     }
 }

@@ -1,7 +1,8 @@
 //! [`GpuPrefilter`]: harmonics and prefiltered cube maps of latents, without leaving the device.
 //!
 //! A latent's radiance on rings of latitude gives its spherical harmonics (LIGHT (19)); harmonics times one number per degree,
-//! summed in every direction, give a level (LIGHT (20)). Nothing is sampled at random, so nothing is noisy from frame to frame.
+//! summed in every direction, give a level (LIGHT (20)). Lights are too narrow for that: their harmonics are in closed form, and levels
+//! get what the lobe makes of them (LIGHT (21)). Nothing is sampled at random, so nothing is noisy from frame to frame.
 //!
 //! ```no_run
 //! use veni_gpu::wgpu::{CommandEncoder, Texture};
@@ -48,6 +49,8 @@ pub struct GpuPrefilter {
     layout: BindGroupLayout,
     passes: [ComputePipeline; 2],
     chains: Chains,
+    /// What stands for the lights of latents without.
+    no_lights: Buffer,
 }
 
 /// [`SpectrumTables`] on the device.
@@ -91,9 +94,9 @@ impl GpuPrefilter {
             )));
         }
         let tables = SpectrumTables::new(degree);
-        let accesses =
-            [Access::Uniform { bytes: 16, dynamic: false }, Access::Read, Access::Read, Access::Read];
-        let accesses: Vec<_> = accesses.into_iter().chain([Access::Write, Access::Write]).collect();
+        let (uniform, read, write) =
+            (Access::Uniform { bytes: 16, dynamic: false }, Access::Read, Access::Write);
+        let accesses = [uniform, read, read, read, write, write, read, write];
         let layout = guarded(device, "veni harmonics", || layout(device, &accesses))?;
         let module = guarded(device, "veni harmonics", || module(device, spectrum_source()))?;
         let [waves, degrees] = SPECTRUM_ENTRY_POINTS
@@ -104,6 +107,7 @@ impl GpuPrefilter {
             layout,
             passes: [waves?, degrees?],
             chains: Chains::default(),
+            no_lights: storage(device, "veni harmonics of lights", &[0; 16])?,
         })
     }
 

@@ -1,6 +1,6 @@
 //! The uniform of a light: `VeniLight` in `light_layout.wgsl`.
 
-/// Most compact lights of a light: [`LightOptions::MOST`](veni_light::light::LightOptions::MOST).
+/// Most compact lights of a light, and of a latent: [`Lights::MOST`](veni_light::light::Lights::MOST).
 pub const MAX_LIGHTS: usize = 8;
 
 /// A light's few numbers. Directions are native and as they are before the rotation.

@@ -1,10 +1,12 @@
 //! Weights and latents in the order that `layout.wgsl` describes.
 
 use veni_light::field::Field;
+use veni_light::latent::Lobe;
+use veni_light::light::{Falloff, Lights};
 use veni_light::model::Model;
 use veni_light::{Error, Result};
 
-use super::Sizes;
+use super::{MAX_LIGHTS, MAX_LOBES, Sizes};
 
 /// The two buffers of a model.
 #[derive(Clone, Debug)]
@@ -74,18 +76,21 @@ pub fn pack_model(model: &Model) -> PackedModel {
 /// model that conditioned it.
 ///
 /// # Errors
-/// [`Error::Unsupported`] if the code has lights or lobes: the shaders decode its vectors. A host that draws the lights itself packs
-/// [`Field::without_lights`].
+/// [`Error::Unsupported`] if the code has more lights than [`MAX_LIGHTS`] or more lobes than [`MAX_LOBES`]: there is no room for them. A
+/// host that draws the lights itself packs [`Field::without_lights`].
 ///
 /// # Panics
 /// If that model's hidden size is too small for `sizes`.
 pub fn pack_latent(sizes: Sizes, field: &Field, out: &mut Vec<f32>) -> Result<()> {
     let folded = field.folded();
-    if !(field.lights().is_empty() && folded.lobes.is_empty()) {
-        return Err(Error::unsupported(
-            "the shaders decode the vectors of a code, not its lights and lobes: draw its lights as your own (Field::lights), and \
-             condition a latent without them",
-        ));
+    for (count, most, what) in
+        [(field.lights().len(), MAX_LIGHTS, "lights"), (folded.lobes.len(), MAX_LOBES, "lobes")]
+    {
+        if count > most {
+            return Err(Error::unsupported(format!(
+                "a code of {count} {what}: the shaders have room for {most}"
+            )));
+        }
     }
     let mut rows = Rows { row: 4 * sizes.columns(), data: std::mem::take(out) };
     rows.push(&folded.input_bias[..sizes.hidden]);
@@ -99,8 +104,48 @@ pub fn pack_latent(sizes: Sizes, field: &Field, out: &mut Vec<f32>) -> Result<()
     let counts = [sizes.columns(), sizes.layers, sizes.latents + 2].map(|n| n as f32);
     data.push(folded.log_exposure);
     data.extend(counts);
+    push_lights(field.lights(), &mut data);
+    push_lobes(folded.lobes, &mut data);
     *out = data;
     Ok(())
+}
+
+/// Two vec4s of each light that a direction can meet, and zeros for the others.
+fn push_lights(lights: &Lights, data: &mut Vec<f32>) {
+    let end = data.len() + 8 * MAX_LIGHTS;
+    let met = lights.iter().filter_map(|light| Some((light.direction, light.profile()?)));
+    let rows: Vec<_> = met
+        .map(|([x, y, z], profile)| {
+            let [r, g, b] = profile.peak.map(|v| v.min(f32::MAX));
+            [x, y, z, extent(profile.falloff), r, g, b, 0.0]
+        })
+        .collect();
+    push_rows(&rows, end, data);
+}
+
+fn push_lobes(lobes: &[Lobe], data: &mut Vec<f32>) {
+    let end = data.len() + 8 * MAX_LOBES;
+    let row = |lobe: &Lobe| {
+        let ([x, y, z], [r, g, b]) = (lobe.direction, lobe.amplitude);
+        [x, y, z, -0.5 * lobe.sharpness, r, g, b, 0.0]
+    };
+    push_rows(&lobes.iter().map(row).collect::<Vec<_>>(), end, data);
+}
+
+/// Rows with their number in the last component of the first, and zeros up to `end`.
+fn push_rows(rows: &[[f32; 8]], end: usize, data: &mut Vec<f32>) {
+    let first = data.len();
+    data.extend_from_slice(rows.as_flattened());
+    data.resize(end, 0.0);
+    data[first + 7] = rows.len() as f32;
+}
+
+/// How a light falls off as one number: the squared chord of a disc, −κ/2 of a glow.
+pub(super) fn extent(falloff: Falloff) -> f32 {
+    match falloff {
+        Falloff::Disc(square) => square,
+        Falloff::Glow(kappa) => (-0.5 * kappa) as f32,
+    }
 }
 
 /// `v` as a number of 12 significant bits and the rest: products of the first with its like are exact.

@@ -1,5 +1,6 @@
 //! The uniform of a bake: `VeniRequest` in `request.wgsl`.
 
+use veni_light::light::Falloff;
 use veni_light::sphere::Frame;
 
 /// How the directions of a bake are laid out.
@@ -58,8 +59,10 @@ pub struct Request {
     pub log_exposure: f32,
     /// Largest number that is stored; values beyond it are clamped to it, of either sign.
     pub largest: f32,
-    /// Store log radiance instead of radiance.
+    /// Store log radiance, which is without lights, instead of radiance.
     pub logarithm: bool,
+    /// Add the lights of the latents.
+    pub lights: bool,
     /// Index of the first direction within the grid.
     pub first: u32,
     /// Directions for each latent.
@@ -72,7 +75,22 @@ pub struct Request {
 
 impl Request {
     /// Bytes of the uniform.
-    pub const BYTES: usize = 80;
+    pub const BYTES: usize = 96;
+
+    /// Factor of the radiance of lights.
+    pub fn light_scale(&self) -> f32 {
+        if self.lights { self.log_exposure.exp() } else { 0.0 }
+    }
+
+    /// Half of the largest κ of a glow that is smooth within a pixel, and taken at its middle; 0 for a list, which has no pixels.
+    pub fn smoothest(&self) -> f32 {
+        let pixel = match self.grid {
+            Grid::Equirect { height, .. } => std::f64::consts::PI / f64::from(height),
+            Grid::Cube { size } => 2.0 / f64::from(size),
+            Grid::List { .. } => return 0.0,
+        };
+        (0.5 * Falloff::sharpest(pixel)) as f32
+    }
 
     /// The uniform, little endian as WGSL lays it out.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
@@ -89,7 +107,8 @@ impl Request {
             [d, e, g, width],
             [h, i, j, height],
             [self.first, self.count, self.latent, self.log_exposure.to_bits()],
-            [self.largest.to_bits(), u32::from(self.logarithm), self.tile, 0],
+            [self.largest.to_bits(), u32::from(self.logarithm), self.tile, self.light_scale().to_bits()],
+            [self.smoothest().to_bits(), 0, 0, 0],
         ];
         let mut bytes = [0; Self::BYTES];
         let words = words.as_flattened().iter();

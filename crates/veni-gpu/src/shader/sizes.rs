@@ -2,6 +2,11 @@
 
 use veni_light::model::ModelConfig;
 
+use super::MAX_LIGHTS;
+
+/// Most lobes of a latent.
+pub const MAX_LOBES: usize = 16;
+
 /// Sizes of a decoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Sizes {
@@ -43,7 +48,7 @@ impl Sizes {
 
     /// vec4s of one latent's block.
     pub fn latent_stride(self) -> usize {
-        self.columns() * (self.layers + 1) + self.latents + 1
+        self.columns() * (self.layers + 1) + self.latents + 1 + 2 * (MAX_LIGHTS + MAX_LOBES)
     }
 
     /// Multiply-adds of the folded network for one direction (padding not counted).

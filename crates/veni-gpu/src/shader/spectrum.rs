@@ -16,14 +16,15 @@ pub const LEVEL_ENTRY_POINT: &str = "veni_level";
 pub const MAX_DEGREE: usize = 128;
 
 /// The module that turns radiance on rings into harmonics. Group 0: a uniform of three u32 (rings, columns, degree; 16 bytes);
-/// phases, Legendre functions and radiance, read-only; waves (2 · rings · (degree + 1) vec4f per latent) and coefficients
-/// ((degree + 1)² vec4f per latent), written.
+/// phases, Legendre functions and radiance (without lights), read-only; waves (2 · rings · (degree + 1) vec4f per latent) and
+/// coefficients ((degree + 1)² vec4f per latent), written; those of the lights ([`pack_light_harmonics`](super::pack_light_harmonics)),
+/// read-only; and the coefficients with the lights, written.
 pub fn spectrum_source() -> &'static str {
     include_str!("../../shaders/spectrum.wgsl")
 }
 
-/// The module that turns harmonics into a level. Group 0: the uniform [`Level`](super::Level); steps, gains and coefficients,
-/// read-only; a write-only storage texture (2D array of six layers per latent).
+/// The module that turns harmonics into a level. Group 0: the uniform [`Level`](super::Level); steps, gains and coefficients (without
+/// lights), read-only; a write-only storage texture (2D array of six layers per latent); lights ([`Glints`](super::Glints)), read-only.
 pub fn level_source(format: TexelFormat) -> String {
     let level = include_str!("../../shaders/level.wgsl").replace("VENI_FORMAT", format.wgsl());
     [&level, include_str!("../../shaders/cube.wgsl")].join("\n")

@@ -6,11 +6,17 @@ pub(super) const LAYOUT: &str = include_str!("../../shaders/layout.wgsl");
 pub(super) const TURNS: &str = include_str!("../../shaders/turns.wgsl");
 pub(super) const ENCODE: &str =
     concat!(include_str!("../../shaders/turns.wgsl"), "\n", include_str!("../../shaders/encode.wgsl"));
-pub(super) const FIELD: &str = include_str!("../../shaders/field.wgsl");
+pub(super) const FIELD: &str =
+    concat!(include_str!("../../shaders/compact.wgsl"), "\n", include_str!("../../shaders/field.wgsl"));
 
-/// WGSL with `fn veni_log_radiance(direction: vec3f) -> vec3f` and `fn veni_radiance` of the first uploaded latent
-/// (and `veni_log_radiance_of(index, direction)`), for pasting into a shader. It has no bindings inside: declare those of
-/// [`field_bindings`]. Directions are unit vectors of the native frame (z up).
+/// WGSL with `fn veni_radiance(direction: vec3f) -> vec3f` of the first uploaded latent, `fn veni_log_radiance` of it without its
+/// lights, and `fn veni_lights` of these alone (and `veni_log_radiance_of(index, direction)`, `veni_lights_of(index, direction)`), for
+/// pasting into a shader. It has no bindings inside: declare those of [`field_bindings`]. Directions are unit vectors of the native
+/// frame (z up).
+///
+/// `veni_radiance` is a sun's full radiance where the direction meets its disc: whoever integrates it over directions drawn without
+/// regard to the sun gets noise. Sample the sun ([`light`](super::light)), or draw it as a light of its own and leave `veni_lights`
+/// out: e to the power of `veni_log_radiance`.
 pub fn field(sizes: Sizes) -> String {
     let Sizes { latents, hidden, layers } = sizes;
     let constants = format!(

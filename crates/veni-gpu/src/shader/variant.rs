@@ -183,7 +183,9 @@ impl Variant {
                 concat!(
                     include_str!("../../shaders/cube.wgsl"),
                     "\n",
-                    include_str!("../../shaders/directions_grid.wgsl")
+                    include_str!("../../shaders/directions_grid.wgsl"),
+                    "\n",
+                    include_str!("../../shaders/lights_grid.wgsl")
                 )
             }
             Directions::Buffer => include_str!("../../shaders/directions_buffer.wgsl"),
@@ -254,17 +256,14 @@ impl Variant {
         [("VENI_LATENTS", latents as f64), ("VENI_HIDDEN", hidden as f64), ("VENI_LAYERS", layers as f64)]
     }
 
-    /// Group 0, by binding number.
+    /// Group 0, by binding number: matrices, vectors, latents, the request, the target; then the directions, or for a grid what its
+    /// pixels gain from lights ([`pack_gains`](super::pack_gains)).
     pub fn bindings(&self) -> Vec<Binding> {
         let target = match self.store {
             Store::Texture(format) => Binding::Texture(format),
             Store::Buffer => Binding::Write,
         };
-        let mut all = vec![Binding::Read, Binding::Read, Binding::Read, Binding::Uniform, target];
-        if self.directions == Directions::Buffer {
-            all.push(Binding::Read);
-        }
-        all
+        vec![Binding::Read, Binding::Read, Binding::Read, Binding::Uniform, target, Binding::Read]
     }
 
     /// Directions that one workgroup evaluates.
@@ -333,6 +332,7 @@ mod tests {
                     log_exposure: 0.0,
                     largest: f32::MAX,
                     logarithm: false,
+                    lights: true,
                     first: 0,
                     count: width * height,
                     latent: 0,

@@ -53,12 +53,14 @@ fn what_does_not_fit_is_named() {
     let mut poisoned = latent(4, 1);
     poisoned.vectors[2][1] = f32::NAN;
     assert!(message(&poisoned).contains("vector 2"));
-    // what the shaders do not draw is not left out without a word
+    // what there is no room for is not left out without a word
     let sun = CompactLight::new([0.0, 0.0, 1.0], [1.0; 3], CompactLight::SUN_RADIUS);
-    let lit = Latent { lights: Lights::new(Some(sun), []), ..latent(4, 1) };
-    assert!(message(&lit).contains("lights"));
+    let lit = |count| Latent { lights: Lights::new(None, vec![sun; count]), ..latent(4, 1) };
+    assert!(message(&lit(9)).contains("9 lights: the shaders have room for 8"));
     let lobe = Lobe { direction: [0.0, 0.0, 1.0], amplitude: [1.0; 3], sharpness: 4.0 };
-    assert!(message(&Latent { lobes: vec![lobe], ..latent(4, 1) }).contains("lobes"));
+    let detailed = |count| Latent { lobes: vec![lobe; count], ..latent(4, 1) };
+    assert!(message(&detailed(17)).contains("17 lobes: the shaders have room for 16"));
+    decoder.condition_batch(queue, &[lit(8), detailed(16)]).unwrap();
     assert!(decoder.condition_batch(queue, &[]).unwrap_err().to_string().contains("0 latents"));
     let two = [latent(4, 1), latent(4, 2)];
     assert!(decoder.update(queue, &latents, 0, &two).unwrap_err().to_string().contains("do not fit"));

@@ -18,6 +18,8 @@ pub(crate) struct Work {
     pub(crate) twin: Twin,
     pub(crate) directions: Vec<[f32; 3]>,
     pub(crate) request: Request,
+    /// What pixels gain from lights, if the directions are a grid's.
+    pub(crate) gains: Vec<[u32; 4]>,
 }
 
 impl Work {
@@ -36,19 +38,21 @@ impl Work {
             log_exposure: 0.25,
             largest: f32::MAX,
             logarithm: true,
+            lights: true,
             first: 0,
             count,
             latent: 0,
             tile: 0,
         };
-        Self { twin: Twin::new(packed, blocks), directions, request }
+        Self { twin: Twin::new(packed, blocks), directions, request, gains: vec![[0; 4]] }
     }
 
     /// What the twin stores for each direction.
     pub(crate) fn expected(&self) -> Vec<[f32; 3]> {
         let value = |d: &[f32; 3]| {
-            let log = self.twin.veni_log_radiance_of(0, listed(&self.request, *d));
-            stored(&self.request, log).map(|v| v as f32)
+            let d = listed(&self.request, *d);
+            let (log, lights) = (self.twin.veni_log_radiance_of(0, d), self.twin.veni_lights_of(0, d));
+            stored(&self.request, log, lights).map(|v| v as f32)
         };
         self.directions.iter().map(value).collect()
     }
@@ -91,7 +95,11 @@ impl Work {
         let twin = &self.twin;
         let mut buffers = vec![filled(&twin.matrices), filled(&twin.vectors), filled(&twin.latents)];
         let uniform = gpu.buffer(Request::BYTES as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
-        buffers.extend([uniform.clone(), gpu.pixels(size), gpu.upload(&self.directions)]);
+        let sixth = match variant.directions {
+            Directions::Buffer => gpu.upload(&self.directions),
+            Directions::Grid => filled(bytemuck::cast_slice(&self.gains)),
+        };
+        buffers.extend([uniform.clone(), gpu.pixels(size), sixth]);
         assert_eq!(variant.bindings()[3], Binding::Uniform);
         let entries: Vec<_> = (0..)
             .zip(&buffers)

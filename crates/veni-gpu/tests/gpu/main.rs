@@ -5,6 +5,7 @@
 
 mod bakes;
 mod breaks;
+mod compact;
 mod cross_check;
 mod errors;
 mod kernels;
@@ -14,6 +15,7 @@ mod memory;
 mod naga;
 mod prefilter;
 mod prefilter_by_hand;
+mod prefilter_lights;
 mod repetition;
 mod stages;
 mod util;

@@ -117,7 +117,8 @@ fn the_function_pastes_into_a_shader_of_its_own() {
         @group(1) @binding(0) var<storage, read_write> out: array<vec4f>;
         @compute @workgroup_size(64)
         fn main(@builtin(global_invocation_id) id: vec3u) {
-            out[id.x] = vec4f(veni_radiance(vec3f(0.0, 0.6, 0.8)) + veni_log_radiance(vec3f(0.0, 0.0, 1.0)), 1.0);
+            let up = vec3f(0.0, 0.0, 1.0);
+            out[id.x] = vec4f(veni_radiance(vec3f(0.0, 0.6, 0.8)) + veni_log_radiance(up) + veni_lights(up), 1.0);
         }";
     for weights in [Weights::Single, Weights::Half] {
         let enable = if weights == Weights::Half { "enable f16;\n" } else { "" };

@@ -20,7 +20,7 @@ fn sky(model: &Model, seed: u64) -> Latent {
 }
 
 impl Gpu {
-    fn chain(&self, format: TextureFormat, size: u32, levels: u32, latents: u32) -> Texture {
+    pub(crate) fn chain(&self, format: TextureFormat, size: u32, levels: u32, latents: u32) -> Texture {
         self.opened.device.create_texture(&TextureDescriptor {
             label: None,
             size: wgpu::Extent3d { width: size, height: size, depth_or_array_layers: 6 * latents },
@@ -34,7 +34,7 @@ impl Gpu {
     }
 
     /// A level of a chain.
-    fn level(&self, chain: &Texture, level: u32) -> Vec<[f32; 3]> {
+    pub(crate) fn level(&self, chain: &Texture, level: u32) -> Vec<[f32; 3]> {
         let size = chain.width() >> level;
         let one = self.texture_with(
             chain.format(),
@@ -53,7 +53,12 @@ impl Gpu {
         self.read_texture(&one)
     }
 
-    fn analyse(&self, prefilter: &GpuPrefilter, decoder: &GpuDecoder, latents: &[Latent]) -> GpuHarmonics {
+    pub(crate) fn analyse(
+        &self,
+        prefilter: &GpuPrefilter,
+        decoder: &GpuDecoder,
+        latents: &[Latent],
+    ) -> GpuHarmonics {
         let harmonics = prefilter.harmonics(latents.len() as u32).unwrap();
         let latents = decoder.condition_batch(&self.opened.queue, latents).unwrap();
         let mut encoder = self.opened.device.create_command_encoder(&Default::default());
@@ -69,7 +74,7 @@ impl Gpu {
 }
 
 /// Root of the summed squares of differences over that of what is expected. A NaN counts as infinite.
-fn relative<T: Copy + Into<f64>>(found: &[[T; 3]], expected: &[[f64; 3]]) -> f64 {
+pub(crate) fn relative<T: Copy + Into<f64>>(found: &[[T; 3]], expected: &[[f64; 3]]) -> f64 {
     assert_eq!(found.len(), expected.len());
     let (mut off, mut whole) = (0.0, 0.0);
     for (a, b) in found.as_flattened().iter().zip(expected.as_flattened()) {
@@ -80,7 +85,7 @@ fn relative<T: Copy + Into<f64>>(found: &[[T; 3]], expected: &[[f64; 3]]) -> f64
     if relative.is_nan() { f64::INFINITY } else { relative }
 }
 
-fn double(pixels: &[[f32; 3]]) -> Vec<[f64; 3]> {
+pub(crate) fn double(pixels: &[[f32; 3]]) -> Vec<[f64; 3]> {
     pixels.iter().map(|rgb| rgb.map(f64::from)).collect()
 }
 
@@ -282,10 +287,13 @@ fn mistakes_are_noticed() {
         ("select(0u, 1u, odd)", "0u"),
         ("(degree * (degree + 1u) / 2u + order)", "(degree * (degree + 1u) / 2u + degree - order)"),
         ("select(id.x - middle, middle - id.x, odd)", "select(middle - id.x, id.x - middle, odd)"),
+        ("sum += lights[at].xyz", "sum -= lights[at].xyz"),
+        ("rest[at] = vec4f(sum, 0.0);", "rest[at] = vec4f();"),
     ] {
         assert!(spectrum.contains(from), "the shader no longer has `{from}`: the break breaks nothing");
-        let [harmonics, _] = work.off(&gpu, &spectrum.replace(from, to), &level);
-        assert!(harmonics > 5e-6, "`{to}` in place of `{from}` is not noticed: {harmonics:e}");
+        let [harmonics, texels] = work.off(&gpu, &spectrum.replace(from, to), &level);
+        let off = harmonics.max(texels);
+        assert!(off > 5e-6, "`{to}` in place of `{from}` is not noticed: {off:e}");
     }
     for (from, to) in [
         ("d.z * q - step.y * before", "d.z * q + step.y * before"),
@@ -297,6 +305,10 @@ fn mistakes_are_noticed() {
         ("level.axis_y * v.y", "level.axis_y * -v.y"),
         ("id.z / 6u, d", "0u, d"),
         ("scale * scale * scale", "scale"),
+        ("irradiance.xyz * value", "irradiance.xyz"),
+        ("m < glints[latent].y", "m + 1u < glints[latent].y"),
+        ("veni_glint_value(table, low + 1u)", "veni_glint_value(table, low)"),
+        ("veni_glints(id.z / 6u, d)", "veni_glints(0u, d)"),
     ] {
         assert!(level.contains(from), "the shader no longer has `{from}`: the break breaks nothing");
         let [_, texels] = work.off(&gpu, &spectrum, &level.replace(from, to));

@@ -1,9 +1,11 @@
 //! The kernels of harmonics and levels run from `shader` alone, as a host of another API would: text, tables, uniforms.
 
-use veni_gpu::shader::twin::{veni_degrees, veni_harmonics};
-use veni_gpu::shader::{LEVEL_ENTRY_POINT, Level, SPECTRUM_ENTRY_POINTS, SpectrumTables};
+use veni_gpu::shader::twin::{veni_degrees, veni_glints, veni_harmonics};
+use veni_gpu::shader::{
+    Glints, LEVEL_ENTRY_POINT, Level, SPECTRUM_ENTRY_POINTS, SpectrumTables, pack_light_harmonics,
+};
 use veni_gpu::wgpu::{self, BufferUsages, TextureFormat};
-use veni_light::light::lobe_gains;
+use veni_light::light::{CompactLight, Lights, lobe_gains};
 use veni_light::sphere::{CubeFace, Frame};
 
 use crate::util::Gpu;
@@ -19,6 +21,10 @@ pub(crate) struct Work {
     radiance: Vec<[f32; 4]>,
     gains: Vec<f64>,
     level: Level,
+    /// Lights of each latent, which are not in its radiance.
+    lights: [Lights; LATENTS],
+    glints: Vec<[u32; 4]>,
+    /// Lights included.
     coefficients: Vec<[f64; 3]>,
     texels: Vec<[f64; 3]>,
 }
@@ -42,6 +48,12 @@ impl Work {
             radiance.chunks_exact(each).flat_map(|r| veni_degrees(&tables, r)).collect();
         // a lobe that keeps all degrees
         let gains = lobe_gains(0.4, DEGREE);
+        let light = |d, radius| CompactLight::new(d, [0.3, 0.2, 0.4], radius);
+        let lights = [
+            Lights::new(None, [light([0.0, 0.6, 0.8], 0.3)]),
+            Lights::new(Some(light([0.48, -0.6, 0.64], 0.1)), [light([0.0, 0.0, -1.0], 0.01)]),
+        ];
+        let glints = Glints::new(0.4).pack(&lights);
         let samples = 2;
         let level = Level {
             size: SIZE,
@@ -56,7 +68,7 @@ impl Work {
         let (sin, cos) = (-level.rotation).sin_cos();
         let n = SIZE * samples;
         let mut texels = Vec::new();
-        for own in coefficients.chunks_exact(tables.coefficients()) {
+        for (latent, own) in coefficients.chunks_exact(tables.coefficients()).enumerate() {
             for (face, texel) in CubeFace::ALL.iter().flat_map(|f| (0..SIZE * SIZE).map(move |t| (f, t))) {
                 let (mut sum, mut whole) = ([0.0; 3], 0.0);
                 for s in 0..samples * samples {
@@ -66,14 +78,18 @@ impl Work {
                     let [x, y, z] = Frame::Gltf.to_native(v.map(|c| (c / length) as f32)).map(f64::from);
                     let d = [x * cos - y * sin, x * sin + y * cos, z];
                     let (value, weight) = (veni_harmonics(&tables, &gains, own, d), length.powi(-3));
-                    sum = [0, 1, 2].map(|c| sum[c] + weight * value[c]);
+                    let more = veni_glints(&glints, latent, d);
+                    sum = [0, 1, 2].map(|c| sum[c] + weight * (value[c] + more[c]));
                     whole += weight;
                 }
                 texels.push(sum.map(|s| (s / whole).max(0.0)));
             }
         }
         let radiance = radiance.into_iter().map(|[r, g, b]| [r, g, b, f32::NAN]).collect();
-        Self { tables, radiance, gains, level, coefficients, texels }
+        let added = pack_light_harmonics(DEGREE, &lights);
+        let whole = |(rest, added): (&[f64; 3], &[f32; 4])| [0, 1, 2].map(|c| rest[c] + f64::from(added[c]));
+        let coefficients = coefficients.iter().zip(&added).map(whole).collect();
+        Self { tables, radiance, gains, level, lights, glints, coefficients, texels }
     }
 
     /// Relative RMS differences of harmonics and of texels from the twin's.
@@ -92,17 +108,20 @@ impl Work {
         let legendre = storage(bytemuck::cast_slice(&tables.legendre));
         let radiance = storage(bytemuck::cast_slice(&self.radiance));
         let waves = gpu.pixels(LATENTS * tables.waves());
-        let coefficients = gpu.pixels(LATENTS * tables.coefficients());
+        let [rest, coefficients] = [(); 2].map(|()| gpu.pixels(LATENTS * tables.coefficients()));
+        let lights = storage(bytemuck::cast_slice(&pack_light_harmonics(DEGREE, &self.lights)));
         let rings = filled(&tables.to_bytes(), BufferUsages::UNIFORM);
         let orders = DEGREE as u32 + 1;
         let module = module(gpu, spectrum);
         // each entry point uses some of the bindings
-        let of_waves = [(0, &rings), (1, &phases), (3, &radiance), (4, &waves)];
-        let of_degrees = [(0, &rings), (2, &legendre), (4, &waves), (5, &coefficients)];
+        let of_waves = vec![(0, &rings), (1, &phases), (3, &radiance), (4, &waves)];
+        let of_degrees =
+            vec![(0, &rings), (2, &legendre), (4, &waves), (5, &rest), (6, &lights), (7, &coefficients)];
         let groups = [orders * tables.rings as u32, orders * orders].map(|n| n.div_ceil(64));
         for ((entry, buffers), groups) in SPECTRUM_ENTRY_POINTS.iter().zip([of_waves, of_degrees]).zip(groups)
         {
-            let resources = buffers.map(|(binding, buffer)| (binding, buffer.as_entire_binding()));
+            let resources: Vec<_> =
+                buffers.into_iter().map(|(binding, buffer)| (binding, buffer.as_entire_binding())).collect();
             run(gpu, &module, entry, &resources, [groups, 1, LATENTS as u32]);
         }
         let texture = gpu.texture(TextureFormat::Rgba32Float, [SIZE, SIZE, 6 * LATENTS as u32]);
@@ -113,8 +132,10 @@ impl Work {
         let uniform = filled(&self.level.to_bytes(), BufferUsages::UNIFORM);
         let (steps, gains) =
             (storage(bytemuck::cast_slice(&tables.steps)), storage(bytemuck::cast_slice(&gains)));
-        let buffers = [&uniform, &steps, &gains, &coefficients];
-        let mut resources: Vec<_> = (0..).zip(buffers.map(|buffer| buffer.as_entire_binding())).collect();
+        let glints = storage(bytemuck::cast_slice(&self.glints));
+        let buffers = [(0, &uniform), (1, &steps), (2, &gains), (3, &rest), (5, &glints)];
+        let mut resources: Vec<_> =
+            buffers.map(|(binding, buffer)| (binding, buffer.as_entire_binding())).into();
         resources.push((4, wgpu::BindingResource::TextureView(&view)));
         let module = self::module(gpu, level);
         run(

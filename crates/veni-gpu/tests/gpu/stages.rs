@@ -93,12 +93,12 @@ fn tiles() {
     }
 }
 
-/// The entry point of kernel "each" replaced by one that writes what `expression` gives for direction `index`.
-fn each(work: &Work, grid: bool, expression: &str) -> Option<Vec<[f32; 4]>> {
+/// The entry point of kernel "each" with its last line replaced by one that writes what `expression` gives for direction `index`.
+pub(crate) fn each(work: &Work, grid: bool, expression: &str) -> Option<Vec<[f32; 4]>> {
     each_changed(work, grid, expression, &|source| source)
 }
 
-fn each_changed(
+pub(crate) fn each_changed(
     work: &Work,
     grid: bool,
     expression: &str,
@@ -109,15 +109,14 @@ fn each_changed(
     if grid {
         variant.directions = veni_gpu::shader::Directions::Grid;
     }
-    let mut source = change(variant.source());
-    if grid {
-        // the binding that the runner fills all the same
-        source += "@group(0) @binding(5) var<storage, read> directions: array<vec4f>;\n";
-    }
-    let from = "store(group.z, index, stored(veni_log_radiance_of(request.latent + group.z, direction)));";
+    let source = change(variant.source());
+    let from = "store(group.z, index, stored(veni_log_radiance_of(latent, direction), lights));";
     assert!(source.contains(from));
-    let keep = "if request.count > 4000000000u { target_buffer[0] = directions[0] + veni_matrices[0] \
-                + veni_vectors[0] + veni_latents[0]; }";
+    let sixth = if grid { "bitcast<vec4f>(gains[0])" } else { "directions[0]" };
+    let keep = format!(
+        "if request.count > 4000000000u {{ target_buffer[0] = {sixth} + veni_matrices[0] + veni_vectors[0] \
+         + veni_latents[0]; }}"
+    );
     let to = format!("{keep} target_buffer[index] = {expression};");
     Some(work.run(&gpu, &variant, &source.replace(from, &to), work.request.count as usize))
 }

@@ -15,7 +15,7 @@ impl CompactLight {
     /// indices face after face, row-major, ascending, and radiance.
     pub(super) fn on_cube(&self, frame: Frame, size: usize) -> Vec<(usize, [f32; 3])> {
         if let Some(glow) = Glow::new(self) {
-            return glow_on_cube(&glow, frame, size);
+            return glow_on_cube(self, &glow, frame, size);
         }
         let texel = |(index, part): (usize, f64)| {
             let k = index % (size * size);
@@ -32,13 +32,14 @@ impl CompactLight {
         let half = (0.5 * f64::from(self.radius)).sin();
         let square = 4.0 * half * half;
         // half of a texel's diagonal, at most, at the middle of a face
-        let reach = f64::from(self.radius) + 2f64.sqrt() / size as f64;
-        let reach = 4.0 * (0.5 * reach.min(PI)).sin().powi(2);
+        let angle = (f64::from(self.radius) + 2f64.sqrt() / size as f64).min(PI);
+        let reach = 4.0 * (0.5 * angle).sin().powi(2);
         let apart = |d: [f64; 3]| d.iter().zip(towards).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
         let texel = 2.0 / size as f64;
         let places = (PLACES * texel / f64::from(self.radius).max(1e-9)).clamp(PLACES, MOST_PLACES).ceil();
         let (count, mut parts, mut nearest) = (places as usize, Vec::new(), (f64::INFINITY, 0));
-        for (index, (face, row, column)) in texels(size).enumerate() {
+        for (face, row, column) in near(self.direction, angle, frame, size) {
+            let index = (face as usize * size + row) * size + column;
             let [a, b] = [column, row].map(|k| (k as f64 + 0.5) * texel - 1.0);
             let centre = apart(face.towards(frame, a, b));
             if centre < nearest.0 {
@@ -77,11 +78,13 @@ impl CompactLight {
 }
 
 /// The mean over each texel.
-fn glow_on_cube(glow: &Glow, frame: Frame, size: usize) -> Vec<(usize, [f32; 3])> {
+fn glow_on_cube(light: &CompactLight, glow: &Glow, frame: Frame, size: usize) -> Vec<(usize, [f32; 3])> {
     let texel = 2.0 / size as f64;
     let n = glow.places(texel);
     let mut gains = Vec::new();
-    for (index, (face, row, column)) in texels(size).enumerate() {
+    let angle = 2.0 * (0.5 * glow.reach(2.0 * texel)).min(1.0).asin();
+    for (face, row, column) in near(light.direction, angle, frame, size) {
+        let index = (face as usize * size + row) * size + column;
         let [a, b] = [column, row].map(|k| (k as f64 + 0.5) * texel - 1.0);
         if glow.beyond(face.towards(frame, a, b), 2.0 * texel) {
             continue;
@@ -98,10 +101,41 @@ fn glow_on_cube(glow: &Glow, frame: Frame, size: usize) -> Vec<(usize, [f32; 3])
     gains
 }
 
-/// Face, row and column of every texel.
-fn texels(size: usize) -> impl Iterator<Item = (CubeFace, usize, usize)> {
-    let face = move |face| (0..size * size).map(move |k| (face, k / size, k % size));
+/// Face, row and column of every texel whose middle is within an angle of a direction, in order, and of others around them.
+fn near(
+    direction: [f32; 3],
+    angle: f64,
+    frame: Frame,
+    size: usize,
+) -> impl Iterator<Item = (CubeFace, usize, usize)> {
+    let mut lookup = frame.from_native(direction).map(f64::from);
+    if frame == Frame::Bevy {
+        lookup[2] = -lookup[2];
+    }
+    let face = move |face: CubeFace| {
+        let depth = face.lookup(0.0, 0.0);
+        let [columns, rows] = [face.lookup(1.0, 0.0), face.lookup(0.0, 1.0)].map(|place| {
+            let along = |axis: [f64; 3]| axis.iter().zip(lookup).map(|(a, b)| a * b).sum::<f64>();
+            places([along(depth), along([0, 1, 2].map(|k| place[k] - depth[k]))], angle, size)
+        });
+        rows.flat_map(move |row| columns.clone().map(move |column| (face, row, column)))
+    };
     CubeFace::ALL.into_iter().flat_map(face)
+}
+
+/// Columns (or rows) of a face that may be within an angle of a direction, of which `[depth, along]` are the components along the
+/// face's axis and its columns: an angle of asin(sin(angle)/ρ) at most to either side, ρ the length of the two.
+fn places([depth, along]: [f64; 2], angle: f64, size: usize) -> std::ops::Range<usize> {
+    let (middle, sine) = (along.atan2(depth), angle.sin() / depth.hypot(along));
+    // NaN where the direction is across both
+    let aside = if angle < 0.5 * PI && sine < 1.0 { sine.asin() } else { PI };
+    let [low, high] = [middle - aside, middle + aside].map(|edge| edge.clamp(-0.25 * PI, 0.25 * PI).tan());
+    if middle - aside > 0.25 * PI || middle + aside < -0.25 * PI {
+        return 0..0;
+    }
+    // one more to either side, for what is rounded
+    let place = |at: f64| 0.5 * (at + 1.0) * size as f64;
+    (place(low).floor().max(1.0) as usize - 1)..(place(high).ceil() as usize + 1).min(size)
 }
 
 #[cfg(test)]
@@ -138,6 +172,36 @@ mod tests {
                         cosine.min(1.0).acos() < most,
                         "{frame:?} {direction:?} {radius} {size}: {cosine}"
                     );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_texel_near_a_direction_is_left_out() {
+        for frame in Frame::ALL {
+            for direction in
+                [[0.6, 0.0, 0.8], [0.0, 0.0, -1.0], [0.57735, -0.57735, 0.57735], [-0.96, 0.28, 0.0]]
+            {
+                for (angle, size) in [(0.1, 32), (0.02, 64), (0.7, 16), (1.5, 8), (3.0, 4), (0.9, 1)] {
+                    let found: Vec<_> = near(direction, angle, frame, size).collect();
+                    assert!(
+                        found.is_sorted_by_key(|(face, row, column)| (*face as usize, *row, *column))
+                            && found.len() <= 6 * size * size
+                    );
+                    assert!(angle > 0.1 || found.len() < size * size, "{} of {size}", found.len());
+                    for (k, face) in CubeFace::ALL.into_iter().enumerate() {
+                        for (row, column) in (0..size * size).map(|at| (at / size, at % size)) {
+                            let d = face.direction(frame, size, column, row);
+                            let cosine: f32 = d.iter().zip(direction).map(|(a, b): (&f32, f32)| a * b).sum();
+                            let within = f64::from(cosine.clamp(-1.0, 1.0)).acos() < angle;
+                            let there = found.contains(&(face, row, column));
+                            assert!(
+                                there || !within,
+                                "{frame:?} {direction:?} {angle} {size}: {k} {row} {column}"
+                            );
+                        }
+                    }
                 }
             }
         }

@@ -60,7 +60,17 @@ impl Glow {
 
     /// Radiance in the middle, of the brightest channel.
     pub(super) fn most(&self) -> f32 {
-        self.irradiance.iter().fold(0.0, |most: f32, e| most.max((self.peak * f64::from(*e)) as f32))
+        self.middle().into_iter().fold(0.0, f32::max)
+    }
+
+    /// Radiance in the middle.
+    pub(super) fn middle(&self) -> [f32; 3] {
+        self.irradiance.map(|e| (self.peak * f64::from(e)) as f32)
+    }
+
+    /// κ.
+    pub(crate) fn concentration(&self) -> f64 {
+        self.kappa
     }
 
     /// The standard deviation along each of two axes, radians.
@@ -73,11 +83,36 @@ impl Glow {
         (PER_DEVIATION * pixel / self.deviation()).max(pixel / LARGE).ceil().max(1.0) as usize
     }
 
+    /// The largest κ of which one place gives the mean over a pixel of this angle.
+    pub(super) fn sharpest(pixel: f64) -> f64 {
+        if pixel > LARGE { 0.0 } else { (PER_DEVIATION * pixel).powi(-2) }
+    }
+
+    /// The rows of `rows` that it may reach: the angle to a row is the least to its directions.
+    pub(super) fn rows(&self, grid: Equirect, rows: Range<usize>) -> Range<usize> {
+        let near = self.near(grid);
+        let first = rows.clone().find(|row| near(*row)).unwrap_or(rows.start);
+        let end = rows.rev().find(|row| near(*row)).map_or(first, |last| last + 1);
+        first..end
+    }
+
+    fn near(&self, grid: Equirect) -> impl Fn(usize) -> bool {
+        let height = std::f64::consts::PI / grid.height as f64;
+        let polar = self.direction[2].clamp(-1.0, 1.0).acos();
+        let reach = REACH * self.deviation() + height;
+        move |row| (grid.polar(row) - polar).abs() <= reach
+    }
+
     /// Whether a direction is so far away that there is nothing.
     #[inline]
     pub(super) fn beyond(&self, direction: [f64; 3], margin: f64) -> bool {
         let square: f64 = direction.iter().zip(self.direction).map(|(a, b)| (a - b) * (a - b)).sum();
-        square.sqrt() > REACH * self.deviation() + margin
+        square.sqrt() > self.reach(margin)
+    }
+
+    /// Chords beyond which there is nothing.
+    pub(super) fn reach(&self, margin: f64) -> f64 {
+        REACH * self.deviation() + margin
     }
 
     /// The mean over places (direction, weight).
@@ -91,10 +126,8 @@ impl Glow {
     pub(super) fn add_to_rows(&self, grid: Equirect, rows: Range<usize>, pixels: &mut [[f32; 3]]) {
         let height = std::f64::consts::PI / grid.height as f64;
         let n = self.places(height);
-        let polar = self.direction[2].clamp(-1.0, 1.0).acos();
-        // the angle to the row is the least to its directions
-        let near = |row: usize| (grid.polar(row) - polar).abs() <= REACH * self.deviation() + height;
-        if !rows.clone().any(near) {
+        let near = self.near(grid);
+        if !rows.clone().any(&near) {
             return;
         }
         let azimuth = |fraction: f64| std::f64::consts::PI * (1.0 - 2.0 * fraction / grid.width as f64);
@@ -122,6 +155,19 @@ impl Glow {
 fn concentration(radius: f64) -> f64 {
     let square = (0.5 * radius).sin().powi(2);
     (0..ITERATIONS).fold(1.0 / square, |kappa, _| 1.0 / (square + 2.0 / (2.0 * kappa).exp_m1()))
+}
+
+#[cfg(test)]
+impl Glow {
+    /// About +z, of energy 1.
+    pub(super) fn of_concentration(kappa: f64) -> Self {
+        Self {
+            direction: [0.0, 0.0, 1.0],
+            kappa,
+            peak: kappa / (2.0 * std::f64::consts::PI),
+            irradiance: [1.0; 3],
+        }
+    }
 }
 
 #[cfg(test)]

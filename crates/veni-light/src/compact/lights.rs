@@ -81,6 +81,23 @@ impl Lights {
         }
     }
 
+    /// What each pixel of `rows` of a panorama gains from the lights, as [`Lights::add_to_rows`] adds it: row-major indices within
+    /// the whole grid, ascending for each light, and radiance.
+    pub fn on_rows(&self, grid: Equirect, rows: Range<usize>) -> Vec<(usize, [f32; 3])> {
+        let mut gains = Vec::new();
+        for light in &self.all {
+            let reached = match Glow::new(light) {
+                Some(glow) => glow.rows(grid, rows.clone()),
+                None => Disc::new(light.direction, light.radius).rows(grid, rows.clone()),
+            };
+            let first = reached.start * grid.width;
+            let mut pixels = vec![[0.0; 3]; reached.len() * grid.width];
+            Self::new(None, [*light]).add_to_rows(grid, reached, &mut pixels);
+            gains.extend((first..).zip(pixels).filter(|(_, gained)| *gained != [0.0; 3]));
+        }
+        gains
+    }
+
     /// The largest value that one of the lights adds to a pixel of a panorama.
     pub fn peak(&self, grid: Equirect) -> f32 {
         let of_light = |light: &CompactLight| {
@@ -263,6 +280,26 @@ mod tests {
         assert!(near(&a.rotated(0.4).mirrored(), &a.mirrored().rotated(-0.4)));
         assert!(!near(&a.rotated(0.4).mirrored(), &a.mirrored().rotated(0.4)));
         assert_eq!(a.scaled(2.0).integral(), a.integral().map(|e| 2.0 * e));
+    }
+
+    #[test]
+    fn gains_of_rows_are_what_is_added() {
+        let (sun, glow) = (light(179.9, 30.0, 4.0), CompactLight { radius: 0.1, ..light(100.0, 88.0, 1.0) });
+        let lights = Lights::new(Some(sun), [glow, CompactLight { radius: 0.0, ..light(3.0, -80.0, 2.0) }]);
+        for (width, rows) in [(64, 0..32), (500, 80..100), (64, 28..31), (64, 5..5)] {
+            let grid = Equirect::new(width, width / 2);
+            let mut expected = vec![[0.0; 3]; rows.len() * width];
+            lights.add_to_rows(grid, rows.clone(), &mut expected);
+            let mut found = vec![[0.0; 3]; rows.len() * width];
+            for (index, gained) in lights.on_rows(grid, rows.clone()) {
+                let pixel = &mut found[index - rows.start * width];
+                *pixel = [0, 1, 2].map(|c| pixel[c] + gained[c]);
+            }
+            for (a, b) in found.as_flattened().iter().zip(expected.as_flattened()) {
+                assert!((a - b).abs() <= 1e-6 * b, "{width}, {rows:?}: {a} for {b}");
+            }
+            assert_eq!(rows.is_empty(), expected.iter().all(|p| *p == [0.0; 3]), "{rows:?}");
+        }
     }
 
     #[test]

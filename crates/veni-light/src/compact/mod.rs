@@ -4,10 +4,12 @@ mod cube;
 mod disc;
 mod glow;
 mod lights;
+mod profile;
 
 pub use disc::Disc;
 pub(crate) use glow::Glow;
 pub use lights::Lights;
+pub use profile::{Falloff, Profile};
 
 use std::fmt;
 

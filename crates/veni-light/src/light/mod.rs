@@ -7,7 +7,7 @@
 //! |---|---|
 //! | [`EnvironmentMap`] | radiance of all directions, borrowed |
 //! | [`Light`], [`LightOptions`] | a map split into compact lights, the sun first, and the rest |
-//! | [`CompactLight`], [`Lights`], [`Disc`] | one light, those of a scene, and a light's exact place on pixels |
+//! | [`CompactLight`], [`Lights`], [`Disc`], [`Profile`] | one light, those of a scene, a light's exact place on pixels, its radiance as plain numbers |
 //! | [`sh`] | spherical harmonics |
 //! | [`Spectrum`] | harmonics up to degrees in the hundreds |
 //! | [`Prefilter`], [`CubeMap`], [`Dfg`] | prefiltered maps, and the table that goes with them |
@@ -29,7 +29,7 @@ pub mod sh;
 mod spectrum;
 mod vector;
 
-pub use crate::compact::{CompactLight, Disc, Kind, Lights, RadiusSource};
+pub use crate::compact::{CompactLight, Disc, Falloff, Kind, Lights, Profile, RadiusSource};
 pub use crate::luminance::{LUMINANCE, luminance};
 pub use environment::EnvironmentMap;
 pub use extract::SunChoice;

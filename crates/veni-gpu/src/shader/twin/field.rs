@@ -3,13 +3,14 @@
 use super::{Twin, veni_encode};
 
 impl Twin {
-    /// Natural log of radiance from native unit direction d by latent `index`.
+    /// Natural log of radiance from native unit direction d by latent `index`, without its lights.
     pub fn veni_log_radiance_of(&self, index: usize, d: [f32; 3]) -> [f64; 3] {
         let mut x = self.project(index, d);
         for layer in 0..self.sizes.layers {
             self.residual_layer(index, layer, &mut x);
         }
-        self.output(index, &x)
+        let (network, lobes) = (self.output(index, &x), self.veni_lobes(index, d));
+        [0, 1, 2].map(|c| network[c] + lobes[c])
     }
 
     /// Input bias plus the encoded direction times the input matrix.
@@ -54,11 +55,10 @@ impl Twin {
         add(x, &self.latent(index)[(layer + 1) * self.row()..]);
     }
 
-    /// Log radiance of the last features.
+    /// Log radiance of the last features, without lobes.
     pub fn output(&self, index: usize, x: &[f64]) -> [f64; 3] {
         let row = |channel: usize| &self.vectors[(5 * self.sizes.layers + channel) * self.row()..];
-        let latent = self.latent(index);
-        let exposure = f64::from(latent[latent.len() - 4]);
+        let (exposure, _) = self.after_vectors(index);
         std::array::from_fn(|c| {
             let sum: f64 = x.iter().zip(row(c)).map(|(x, w)| x * f64::from(*w)).sum();
             sum + f64::from(row(3)[c]) + exposure

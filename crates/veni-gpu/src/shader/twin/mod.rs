@@ -2,16 +2,21 @@
 //! precision, the light's functions in single. Slow and plain: for comparing a GPU's stages one by one, and as the truth in
 //! tests.
 
+mod compact;
 mod directions;
 mod encode;
 mod field;
+mod glints;
 mod light;
+mod lights_grid;
 mod output;
 mod spectrum;
 
 pub use directions::{direction_of, listed};
 pub use encode::{veni_encode, veni_sin_cos};
+pub use glints::veni_glints;
 pub use light::{LightTwin, VeniLightSample};
+pub use lights_grid::gained;
 pub use output::stored;
 pub use spectrum::{veni_degrees, veni_harmonics};
 

@@ -2,13 +2,14 @@
 
 use crate::shader::Request;
 
-/// What is stored for a log radiance of the network.
-pub fn stored(request: &Request, log_radiance: [f64; 3]) -> [f64; 3] {
-    log_radiance.map(|v| {
-        let (exposed, largest) = (v + f64::from(request.log_exposure), f64::from(request.largest));
+/// What is stored for a log radiance of the network, lobes included, and the radiance of lights.
+pub fn stored(request: &Request, log_radiance: [f64; 3], lights: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|c| {
+        let exposed = log_radiance[c] + f64::from(request.log_exposure);
+        let largest = f64::from(request.largest);
         if request.logarithm {
             return exposed.clamp(-largest, largest);
         }
-        exposed.clamp(-87.0, 88.5).exp().min(largest)
+        (exposed.clamp(-87.0, 88.5).exp() + f64::from(request.light_scale()) * lights[c]).min(largest)
     })
 }

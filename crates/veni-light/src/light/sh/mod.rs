@@ -1,6 +1,7 @@
 //! Real spherical harmonics of light: projected with exact pixel areas, rotated exactly, made into irradiance, written
 //! as engines read them. LIGHT (10) to (15).
 
+mod bands;
 mod basis;
 mod convention;
 mod pixels;
@@ -17,6 +18,7 @@ use crate::field::Field;
 use crate::sphere::Equirect;
 use crate::{Error, Result};
 
+pub use bands::light_bands;
 pub use basis::Basis;
 pub use pixels::pixel_integrals;
 #[cfg(feature = "gradients")]
@@ -76,7 +78,7 @@ impl<const L: usize> Sh<L> {
         let direction = unit(light.direction);
         let mut row = vec![0.0; Self::LEN];
         Basis::new(L).evaluate(direction, &mut row);
-        let zonal = disc(L, f64::from(light.radius));
+        let zonal = bands::of_disc(L, f64::from(light.radius));
         let term =
             |(index, y): (usize, f64)| light.irradiance.map(|e| f64::from(e) * zonal[index.isqrt()] * y);
         Self { coefficients: row.into_iter().enumerate().map(term).collect() }
@@ -133,25 +135,6 @@ pub fn cosine_lobe(l: usize) -> f64 {
     let ratio: f64 = (1..=l / 2).map(|k| (2 * k - 1) as f64 / (2 * k) as f64).product();
     let sign = if (l / 2) % 2 == 1 { 1.0 } else { -1.0 };
     2.0 * PI * sign * ratio / ((l as f64 + 2.0) * (l as f64 - 1.0))
-}
-
-/// Band factors of a disc of this radius and energy 1.
-fn disc(order: usize, radius: f64) -> Vec<f64> {
-    let s = (0.5 * radius).sin();
-    let open = 2.0 * s * s;
-    if open < 1e-12 {
-        return vec![1.0; order + 1];
-    }
-    let c = radius.cos();
-    // P_{l−1} − P_{l+1} by P_l − 1, so that small discs keep their digits: p_l = P_l − 1
-    let mut p = vec![0.0, -open];
-    for l in 1..=order {
-        let k = l as f64;
-        let next = ((2.0 * k + 1.0) * (c * p[l] - open) - k * p[l - 1]) / (k + 1.0);
-        p.push(next);
-    }
-    let band = |l: usize| if l == 0 { 1.0 } else { (p[l - 1] - p[l + 1]) / ((2 * l + 1) as f64 * open) };
-    (0..=order).map(band).collect()
 }
 
 fn unit(v: [f32; 3]) -> [f64; 3] {
