@@ -42,7 +42,7 @@ struct Kernel {
 struct Gains {
     buffer: Buffer,
     levels: Vec<[u32; 2]>,
-    /// What the lobes make of lights.
+    /// What the lobes make of lights, one for each level, made for the first latent that has some.
     glints: Mutex<Vec<Glints>>,
 }
 
@@ -75,7 +75,7 @@ impl GpuPrefilter {
         let alignment = self.device.limits().min_uniform_buffer_offset_alignment;
         let stride = (Level::BYTES as u32).next_multiple_of(alignment);
         let requests = self.requests(levels, format, &gains, cube, stride)?;
-        let glints = self.glints(&gains, latents, cube)?;
+        let glints = self.glints(levels, &gains, latents, cube)?;
         let groups = (1..levels.count() as u32).zip(&glints).map(|(level, glints)| {
             let view = self.view(cube, level)?;
             let uniform =
@@ -104,14 +104,23 @@ impl GpuPrefilter {
     }
 
     /// The lights of all levels but the first.
-    fn glints(&self, gains: &Gains, latents: &GpuLatents, cube: &PrefilteredCube<'_>) -> Result<Vec<Buffer>> {
+    fn glints(
+        &self,
+        levels: Levels,
+        gains: &Gains,
+        latents: &GpuLatents,
+        cube: &PrefilteredCube<'_>,
+    ) -> Result<Vec<Buffer>> {
+        let dark = !cube.lights || latents.with_lights(|all| all.iter().all(|lights| lights.is_empty()));
+        if dark {
+            return Ok(vec![self.no_lights.clone(); gains.levels.len()]);
+        }
         // a panic elsewhere leaves tables as they were
         let mut glints = gains.glints.lock().unwrap_or_else(PoisonError::into_inner);
-        let dark = !cube.lights || latents.with_lights(|all| all.iter().all(|lights| lights.is_empty()));
+        if glints.is_empty() {
+            glints.extend((1..levels.count()).map(|level| Glints::new(levels.roughness(level))));
+        }
         let of_level = |glints: &mut Glints| {
-            if dark {
-                return Ok(self.no_lights.clone());
-            }
             let packed = latents.with_lights(|lights| glints.pack(lights));
             storage(&self.device, "veni lights of a level", bytemuck::cast_slice(&packed))
         };
@@ -214,7 +223,6 @@ impl Gains {
         // a buffer has bytes even where there is nothing to do
         all.resize(all.len().max(1), 0.0);
         let buffer = storage(device, "veni gains", bytemuck::cast_slice(&all))?;
-        let glints = (1..chain.count()).map(|level| Glints::new(chain.roughness(level))).collect();
-        Ok(Self { buffer, levels, glints: Mutex::new(glints) })
+        Ok(Self { buffer, levels, glints: Mutex::default() })
     }
 }

@@ -127,8 +127,11 @@ fn near(
 /// face's axis and its columns: an angle of asin(sin(angle)/ρ) at most to either side, ρ the length of the two.
 fn places([depth, along]: [f64; 2], angle: f64, size: usize) -> std::ops::Range<usize> {
     let (middle, sine) = (along.atan2(depth), angle.sin() / depth.hypot(along));
-    // NaN where the direction is across both
-    let aside = if angle < 0.5 * PI && sine < 1.0 { sine.asin() } else { PI };
+    // all of them where the axis across both lies within the angle; NaN where the direction is that axis
+    if angle >= 0.5 * PI || sine >= 1.0 || sine.is_nan() {
+        return 0..size;
+    }
+    let aside = sine.asin();
     let [low, high] = [middle - aside, middle + aside].map(|edge| edge.clamp(-0.25 * PI, 0.25 * PI).tan());
     if middle - aside > 0.25 * PI || middle + aside < -0.25 * PI {
         return 0..0;
