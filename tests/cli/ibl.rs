@@ -191,7 +191,7 @@ fn what_cannot_be_is_refused_before_any_work() {
         (&["--engine", "bevy,bevy", "-o", "out"][..], "twice"),
         (&["--engine", "quake", "-o", "out"], "quake"),
         (&["--engine", "bevy", "-o", "out", "--size", "100"], "power of two"),
-        (&["--engine", "bevy", "-o", "file"], "no folder"),
+        (&["--engine", "bevy", "-o", "file"], "not a folder"),
         (&["--engine", "bevy", "-o", "out", "--lux", "0"], "more than 0"),
         (&["--engine", "bevy", "-o", "out", "--sky-size", "64x64"], "twice as wide"),
     ] {

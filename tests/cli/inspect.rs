@@ -54,6 +54,7 @@ fn completions_and_manual_pages_know_every_command() {
     let commands = [
         "bake",
         "sample",
+        "day",
         "synth",
         "encode",
         "evaluate",

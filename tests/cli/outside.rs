@@ -54,7 +54,7 @@ fn a_plan_that_names_other_files_is_refused_by_name() {
     // names of files are made of ids, too
     for id in ["../../../victim", "/victim", ""] {
         plan(&dir, &serde_json::json!({ id: ["train/a.exr"] }).to_string());
-        survives(&dir, "no hash");
+        survives(&dir, "not a hash");
     }
 }
 

@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 use serde_json::{Value, json};
 use veni_light::latent::{Latent, SunRequest};
-use veni_light::light::{EnvironmentMap, Light};
+use veni_light::light::{LightOptions, SunChoice};
 use veni_light::skies::{SkyMeasures, SkyRequest};
 use veni_light::sphere::Equirect;
 
@@ -145,10 +145,14 @@ pub(crate) fn request_json(request: &SkyRequest) -> Value {
 }
 
 /// What came of a request, measured in the pixels of the sky as anyone would measure them: the code is not asked.
-pub(crate) fn measured(latent: &Latent, device: &Device) -> Result<SkyMeasures> {
+/// Where a sun was asked for, it is the strongest light of the sky, of a night's too.
+pub(crate) fn measured(latent: &Latent, device: &Device, request: &SkyRequest) -> Result<SkyMeasures> {
     let grid = Equirect::new(MEASURED, MEASURED / 2);
     let pixels = device.condition(latent)?.bake(grid)?;
-    Ok(SkyMeasures::of(&Light::of(EnvironmentMap::new(grid, &pixels)?)))
+    let asked = request.sun.presence() == Some(true) || request.overcast.is_some();
+    let sun = if asked { SunChoice::Sky } else { SunChoice::Auto };
+    let light = LightOptions { sun, ..LightOptions::default() }.of_pixels(grid, pixels)?;
+    Ok(SkyMeasures::of(&light))
 }
 
 /// Measures, for people.

@@ -173,8 +173,8 @@ mod tests {
             assert!(words.iter().all(|word| message.contains(word)), "{message}");
         };
         let sh = |text: &str, words: &[&str]| said(harmonics(text).map(|_| ()), words);
-        sh("", &["no JSON", "give a list"]);
-        sh("{\"sh\":[[1,2,3]", &["no JSON", "line 1"]);
+        sh("", &["not JSON", "give a list"]);
+        sh("{\"sh\":[[1,2,3]", &["not JSON", "line 1"]);
         sh("7", &["is 7", "give a list"]);
         sh("{}", &["no \"sh\""]);
         sh("{\"sh\":{\"a\":1}}", &["{\"a\":1}"]);

@@ -6,7 +6,7 @@ use veni_light::sphere::Equirect;
 
 /// Latents name the model that they belong to by these: with another hash, every stored latent is a stranger.
 const HASHES: [(usize, &str); 3] =
-    [(27, "25f38109d2d49697"), (147, "0afb9074c719a7f8"), (300, "ffb302e05764497f")];
+    [(27, "a81a7f5c5e8a87f6"), (147, "0afb9074c719a7f8"), (300, "ffb302e05764497f")];
 
 /// FNV-1a of 64 bits.
 fn digest(bytes: impl IntoIterator<Item = u8>) -> u64 {
@@ -48,7 +48,7 @@ fn a_baked_sky_keeps_its_bits() {
     let sky = field.bake(grid);
     if fused() {
         let digest = digest(sky.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
-        assert_eq!(digest, 0x589f_2d89_dcf7_1de8, "the bits of the sky of seed 7 are now 0x{digest:016x}");
+        assert_eq!(digest, 0x794d_6a76_1772_7049, "the bits of the sky of seed 7 are now 0x{digest:016x}");
     }
     // what it looks like, anywhere: log radiance at the middle, near zenith and nadir
     let found =

@@ -128,7 +128,8 @@ impl Bake {
         let latent = self.change.of(&named);
         let on = (device, &loaded.model);
         let baked = self.pictures.write(&job.files, [&named, &latent], picture, on, overwrite, report)?;
-        let measures = self.asked.is_any().then(|| asked::measured(&latent, device)).transpose()?;
+        let measures =
+            self.asked.is_any().then(|| asked::measured(&latent, device, skies.request())).transpose()?;
         self.report(&baked, &latent, measures, baking, report)
     }
 

@@ -107,7 +107,7 @@ impl Day {
                 overwrite,
                 report,
             )?;
-            let measures = asked::measured(&latent, &device)?;
+            let measures = asked::measured(&latent, &device, &request)?;
             let human = format!(
                 "{}: {time}, {}; came: {} ({:.2} s on {})",
                 baked.files.join(", "),

@@ -203,7 +203,10 @@ impl Fit {
                 }
                 if !lit.lights.is_empty() && fitted.scores.is_some() {
                     let whole = self.input.observe(&picture, grid).map_err(|e| e.in_file(path))?;
-                    fitted.scores = Some(model.score(&fitted.best.latent, &whole)?);
+                    // at the exposure of what it is compared with
+                    let mut latent = fitted.best.latent.clone();
+                    latent.log_exposure -= whole.log_exposure();
+                    fitted.scores = Some(model.score(&latent, &whole)?);
                 }
                 fitted
             }

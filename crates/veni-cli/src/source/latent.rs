@@ -13,7 +13,7 @@ use veni_light::random::Stream;
 use veni_light::skies::SkyRequest;
 use veni_light::text::begins_object;
 
-use super::model::{Loaded, embedded, model};
+use super::model::{Loaded, model};
 use super::remembered::is_of_its_pixels;
 use crate::args::{Layer, ModelArgs};
 use crate::asked::request_in_words;
@@ -24,12 +24,25 @@ use crate::report::Report;
 pub(crate) fn model_of<'a>(args: &ModelArgs, files: impl IntoIterator<Item = &'a Path>) -> Result<Loaded> {
     if args.model.is_none() {
         // what cannot be read is reported when it is its turn
-        let latent = files.into_iter().find_map(|path| stored(path).ok().flatten());
-        if let Some(dimension) = latent.and_then(|latent| inside(&latent)) {
-            return embedded(dimension);
+        for path in files {
+            let Some(loaded) = stored(path).ok().flatten().and_then(|latent| inside(&latent)) else {
+                continue;
+            };
+            // an edited image is encoded, by the present model if its own has no encoder
+            if loaded.model.has_encoder() || !was_edited(path, &loaded.model).unwrap_or(false) {
+                return Ok(loaded);
+            }
         }
     }
     model(args)
+}
+
+/// Whether the image `path` has a latent of `model` inside that its pixels no longer come from.
+fn was_edited(path: &Path, model: &Model) -> Result<bool> {
+    match stored(path)? {
+        Some(latent) if !is_latent(path)? => Ok(!is_of_its_pixels(path, &latent, model)?),
+        _ => Ok(false),
+    }
 }
 
 /// The latents that seeds name: drawn from the model's prior, as asked.
@@ -77,6 +90,9 @@ impl RandomSkies {
 pub(crate) fn from_file(path: &Path, layer: &Layer, loaded: &Loaded, report: Report) -> Result<Latent> {
     let model = &loaded.model;
     let mut latent = match stored(path)? {
+        Some(latent) if is_edited_of_another(path, &latent, model)? => {
+            encode(path, layer, loaded, "its pixels were changed after its latent was written", report)?
+        }
         Some(latent) => {
             check(&latent, loaded).with_context(|| path.display().to_string())?;
             if is_latent(path)? || is_of_its_pixels(path, &latent, model)? {
@@ -135,23 +151,41 @@ fn check(latent: &Latent, Loaded { model, name }: &Loaded) -> Result<()> {
     }
 }
 
+/// Whether an image was edited that has a latent of another model inside the program.
+fn is_edited_of_another(path: &Path, latent: &Latent, model: &Model) -> Result<bool> {
+    match inside(latent) {
+        Some(own) if own.model.hash() != model.hash() && !is_cube_map(path)? => was_edited(path, &own.model),
+        _ => Ok(false),
+    }
+}
+
 /// The model that a latent belongs to, and how to name it.
 fn owner(latent: &Latent) -> String {
     match inside(latent) {
-        Some(dimension) => format!("its own model, which is inside this program, with --model {dimension}"),
+        Some(own) if own.model.has_encoder() => {
+            let dimension = 3 * latent.vectors.len();
+            format!("its own model, which is inside this program, with --model {dimension}")
+        }
+        Some(_) => "no model: its own is inside this program, and taken where none is named".to_owned(),
         None => "the latent's own model with --model FILE".to_owned(),
     }
 }
 
-/// The latent dimension of the model inside this program that a latent says it belongs to.
+/// The model inside this program that a latent says it belongs to.
 #[cfg(feature = "pretrained")]
-fn inside(latent: &Latent) -> Option<usize> {
-    let dimension = 3 * latent.vectors.len();
-    Model::pretrained_of(dimension).filter(|model| Some(model.hash()) == latent.model).map(|_| dimension)
+fn inside(latent: &Latent) -> Option<Loaded> {
+    let model = Model::pretrained_of_hash(latent.model.as_deref()?)?;
+    let dimension = 3 * model.latent_vectors();
+    let name = if model.has_encoder() {
+        format!("the model of latent dimension {dimension} inside this program")
+    } else {
+        format!("the earlier model of latent dimension {dimension} inside this program")
+    };
+    Some(Loaded { model, name })
 }
 
 #[cfg(not(feature = "pretrained"))]
-fn inside(_: &Latent) -> Option<usize> {
+fn inside(_: &Latent) -> Option<Loaded> {
     None
 }
 

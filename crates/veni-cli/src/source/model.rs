@@ -37,7 +37,7 @@ fn size(path: &Path) -> Option<usize> {
 }
 
 #[cfg(feature = "pretrained")]
-pub(super) fn embedded(dimension: usize) -> Result<Loaded> {
+fn embedded(dimension: usize) -> Result<Loaded> {
     let model = Model::pretrained_of(dimension).ok_or_else(|| {
         let sizes: Vec<_> = Model::pretrained_sizes().map(|size| size.to_string()).collect();
         anyhow!(
@@ -49,7 +49,7 @@ pub(super) fn embedded(dimension: usize) -> Result<Loaded> {
 }
 
 #[cfg(not(feature = "pretrained"))]
-pub(super) fn embedded(_: usize) -> Result<Loaded> {
+fn embedded(_: usize) -> Result<Loaded> {
     bail!("this build has no model inside: name a model file with --model FILE")
 }
 

@@ -240,7 +240,8 @@ mod tests {
         }
         let behind = balls.render(&light(|d| d[0] < -0.98, [50.0; 3]));
         let middle = balls.normals.iter().position(|n| n[0] < -0.99).unwrap();
-        assert!(behind.iter().all(|rendered| rendered[middle][0] > 5.0), "the camera's side is lit");
+        let lit = behind.each_ref().map(|rendered| rendered[middle][0]);
+        assert!(lit.iter().all(|radiance| *radiance > 2.0), "the camera's side is lit: {lit:?}");
     }
 
     #[test]

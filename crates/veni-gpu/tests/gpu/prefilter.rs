@@ -16,7 +16,8 @@ fn pretrained() -> Model {
 }
 
 fn sky(model: &Model, seed: u64) -> Latent {
-    Latent::from_seed(&model.prior(), seed)
+    // of the vectors: what lights add is compared in `prefilter_lights`
+    Latent::new(Latent::from_seed(&model.prior(), seed).vectors)
 }
 
 impl Gpu {
@@ -117,7 +118,7 @@ fn harmonics_are_those_of_the_panorama() {
                 "degree {degree}: nine harmonics within {nine:.1e}, all within {all:.1e}, relative RMS"
             ));
             // what is beyond the largest degree comes back as a little of what is below it
-            assert!(nine < 1e-3 && all < 4e-3, "degree {degree}: {nine:e} {all:e}");
+            assert!(nine < 1e-3 && all < 6e-3, "degree {degree}: {nine:e} {all:e}");
             // of another sky they are far off
             let other = model.decoder().unwrap().condition(&sky(&model, 5)).unwrap().bake(FINE);
             let other = EnvironmentMap::new(FINE, &other).unwrap();
@@ -170,7 +171,7 @@ fn levels_are_those_of_the_cpu_in_every_frame() {
             // seen along other axes, or another way round, it is another cube
             let other = if frame == Frame::Gltf { CubeAxes::NATIVE } else { CubeAxes::GLTF };
             let other = cpu.level(p, levels.size(level), other);
-            assert!(relative(&found, &double(other.texels())) > 0.3);
+            assert!(relative(&found, &double(other.texels())) > 0.1);
         }
         // the first level is the field
         let first = gpu.level(&chain, 0);

@@ -4,8 +4,11 @@
 //! it (Matheron's rule), x' = x + Rᵀ(R Rᵀ)⁻¹(y − R x) for the rows R that are asked to be y. The moved draw is distributed as the
 //! prior given the condition, and what the condition says nothing about stays.
 
-use super::sun::SunDraw;
 use crate::cholesky::{self, Complex};
+use crate::random::Stream;
+
+/// Number of measures of a sun ([`SunPrior`](super::SunPrior)).
+pub(crate) const MEASURES: usize = 5;
 
 /// Standard normal numbers; w and the sun's heading are circular complex, E|w|² = 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +18,34 @@ pub(crate) struct Draw {
     pub(super) g: Vec<f64>,
     pub(super) exposure: f64,
     pub(super) sun: SunDraw,
+}
+
+/// The random numbers behind a sun.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct SunDraw {
+    /// η.
+    pub(super) presence: f64,
+    /// e, E|e|² = 1.
+    pub(super) azimuth: Complex,
+    /// ξ.
+    pub(super) measures: [f64; MEASURES],
+}
+
+impl SunDraw {
+    /// Number of its real numbers: presence, then measures.
+    pub(crate) const REAL: usize = 1 + MEASURES;
+
+    pub(super) fn real_mut(&mut self) -> [&mut f64; Self::REAL] {
+        let [a, b, c, d, e] = &mut self.measures;
+        [&mut self.presence, a, b, c, d, e]
+    }
+
+    pub(super) fn new(rng: &mut Stream) -> Self {
+        let [presence, _] = rng.normals();
+        let azimuth = rng.normals().map(|v| v * std::f64::consts::FRAC_1_SQRT_2);
+        let ([a, b], [c, d], [e, _]) = (rng.normals(), rng.normals(), rng.normals());
+        Self { presence, azimuth, measures: [a, b, c, d, e] }
+    }
 }
 
 /// The derivative of something with respect to the numbers of a [`Draw`], and by how much it is to change.

@@ -11,12 +11,12 @@ mod lobe;
 mod prior;
 mod sun;
 
-pub(crate) use draw::{Draw, Row};
+pub(crate) use draw::{Draw, MEASURES, Row};
 pub use file::MAX_LATENT_BYTES;
 pub use lobe::Lobe;
 pub use prior::Prior;
-pub(crate) use sun::{MEASURES, irradiance, schema as sun_schema, sine};
 pub use sun::{SunPrior, SunRequest};
+pub(crate) use sun::{irradiance, sine};
 
 use crate::compact::Lights;
 use crate::random::Stream;

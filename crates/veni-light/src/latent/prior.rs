@@ -6,12 +6,12 @@
 //! C = L Lᴴ, Σ = K Kᵀ, w circular complex normal (E|w|² = 1) and g standard normal.
 
 use super::Latent;
-use super::draw::Draw;
 #[cfg(feature = "gradients")]
 use super::draw::Row;
-use super::sun::{SunDraw, SunPrior};
+use super::draw::{Draw, SunDraw};
+use super::sun::SunPrior;
 use crate::cholesky::{self, Complex, Scalar};
-use crate::compact::Lights;
+use crate::compact::{CompactLight, Lights};
 use crate::random::Stream;
 use crate::{Error, Result};
 
@@ -110,7 +110,25 @@ impl Prior {
     /// If a code does not have N vectors.
     #[must_use]
     pub fn with_suns_of(self, codes: &[Latent]) -> Self {
-        Self { sun: SunPrior::fit(codes, &self), ..self }
+        let whitened: Vec<_> = codes.iter().map(|code| self.whitened(&code.vectors)).collect();
+        let suns: Vec<_> = codes.iter().map(|code| code.lights.sun().copied()).collect();
+        Self { sun: SunPrior::fit(&whitened, &suns), ..self }
+    }
+
+    /// The density of the sun given the vectors, if one was fitted: random skies then have suns.
+    pub fn sun(&self) -> Option<&SunPrior> {
+        self.sun.as_ref()
+    }
+
+    /// How likely it is that the sky of these vectors has a sun, in [0, 1], and the most likely one; None where nothing is known of
+    /// suns.
+    ///
+    /// # Panics
+    /// If there are not N vectors.
+    pub fn likely_sun(&self, vectors: &[[f32; 3]]) -> Option<(f64, CompactLight)> {
+        let sun = self.sun.as_ref()?;
+        let (w, g) = self.whitened(vectors);
+        Some(sun.likely(&Draw { w, g, exposure: 0.0, sun: SunDraw::default() }))
     }
 
     /// Draws a code; see [`Latent::sample`].

@@ -16,6 +16,7 @@ mod header;
 #[cfg(feature = "pretrained")]
 mod pretrained;
 mod prior;
+mod prior_sun;
 mod schema;
 
 use std::collections::BTreeMap;

@@ -11,6 +11,10 @@ const FILES: &[(usize, &[u8])] = &[
     (300, veni_models_300::FILE),
 ];
 
+/// Models of earlier versions, without their encoders, by their hash: for the latents that name them.
+const EARLIER: &[(&str, &[u8])] =
+    &[("25f38109d2d49697", include_bytes!("../../assets/veni-27-first.safetensors"))];
+
 impl Model {
     /// The smallest model inside this library: 9 latent vectors (latent dimension D = 27), trained on outdoor
     /// panoramas, with its encoder.
@@ -31,6 +35,20 @@ impl Model {
     pub fn pretrained_of(dimension: usize) -> Option<Self> {
         let (_, bytes) = FILES.iter().find(|(own, _)| *own == dimension)?;
         Some(Self::from_bytes(bytes).expect("embedded model"))
+    }
+
+    /// The model inside this library that has this [hash](Model::hash), which a latent names it by, if there is one. Of a model
+    /// that an earlier version had inside it has no encoder: what it made can be decoded, not made again.
+    ///
+    /// # Panics
+    /// As [`Model::pretrained`].
+    #[allow(clippy::expect_used, reason = "the bytes are part of the program and tested with it")]
+    pub fn pretrained_of_hash(hash: &str) -> Option<Self> {
+        let earlier = EARLIER.iter().find(|(own, _)| *own == hash);
+        if let Some((_, bytes)) = earlier {
+            return Some(Self::from_bytes(bytes).expect("embedded model"));
+        }
+        Self::pretrained_sizes().filter_map(Self::pretrained_of).find(|model| model.hash() == hash)
     }
 
     /// The latent dimensions of the models inside this library: 27, and with `pretrained-large` 147 and 300.

@@ -6,8 +6,9 @@
 
 use std::collections::BTreeMap;
 
+use super::prior_sun::{of_tensors, schema as sun_schema, to_tensors};
 use super::{Array, Model};
-use crate::latent::{Prior, SunPrior, sun_schema};
+use crate::latent::Prior;
 use crate::{Error, Result};
 
 const NAMES: [&str; 5] =
@@ -61,7 +62,7 @@ impl Model {
         let [xy_real, xy_imaginary, z, z_mean, exposure] = NAMES.map(tensor);
         match (xy_real, xy_imaginary, z, z_mean, exposure.as_deref()) {
             (Some(xy_real), Some(xy_imaginary), Some(z), Some(z_mean), Some(&[mean, deviation])) => {
-                let sun = SunPrior::of_tensors(&self.tensors, self.latent_vectors());
+                let sun = of_tensors(&self.tensors, self.latent_vectors());
                 Prior { xy_real, xy_imaginary, z, z_mean, log_exposure: [mean, deviation], sun }
             }
             _ => Prior::standard(self.latent_vectors()),
@@ -88,7 +89,7 @@ impl Model {
             self.tensors.insert((*name).to_owned(), Array { shape, data });
         }
         self.tensors.retain(|name, _| !name.starts_with("prior.sun."));
-        let sun = sun.iter().flat_map(SunPrior::to_tensors);
+        let sun = sun.iter().flat_map(to_tensors);
         self.tensors.extend(sun.map(|(name, array)| (name.to_owned(), array)));
         Ok(())
     }

@@ -189,6 +189,12 @@ fn embedded_models_decode() {
     }
     assert_eq!(Some(Model::pretrained()), Model::pretrained_of(27));
     assert_eq!(Model::pretrained_of(28), None);
+    let now = Model::pretrained();
+    assert_eq!(Model::pretrained_of_hash(&now.hash()), Some(now));
+    // latents of earlier versions
+    let earlier = Model::pretrained_of_hash("25f38109d2d49697").unwrap();
+    assert_eq!((earlier.hash().as_str(), earlier.has_encoder()), ("25f38109d2d49697", false));
+    assert_eq!(Model::pretrained_of_hash("0123456789abcdef"), None);
 }
 
 #[test]

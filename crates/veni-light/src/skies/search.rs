@@ -1,4 +1,4 @@
-//! The least step of a draw that fulfils a request. MODEL (75), (76).
+//! The least step of a draw that fulfils a request. MODEL (76).
 
 use super::{SkyRequest, UP, temperature};
 use crate::field::{Decoder, Field};

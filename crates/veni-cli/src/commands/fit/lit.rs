@@ -51,12 +51,12 @@ impl LitArgs {
         if !self.likely_sun {
             return Ok(());
         }
-        let Some(sun) = prior.sun() else {
+        if prior.sun().is_none() {
             anyhow::bail!("--likely-sun: the model knows nothing of suns; name another with --model");
-        };
+        }
         let likely = |latent: &Latent| {
-            let (chance, light) = sun.likely(prior, &latent.vectors);
-            (chance > 0.5 && !is_seen(light.direction)).then_some((chance, light))
+            let found = prior.likely_sun(&latent.vectors)?;
+            (found.0 > 0.5 && !is_seen(found.1.direction)).then_some(found)
         };
         for latent in &mut best.all {
             latent.lights = Lights::new(likely(latent).map(|(_, light)| light), []);

@@ -191,7 +191,17 @@ mod tests {
                 assert!(message.contains("..") || message.contains("between"), "{set}: no bounds: {message}");
             }
         }
-        let off = ["mage", "scale_invariant", "exposure", "cosine", "kld", "log_mse", "hdr_mse", "ldr_mse"];
+        let off = [
+            "mage",
+            "scale_invariant",
+            "exposure",
+            "cosine",
+            "kld",
+            "log_mse",
+            "hdr_mse",
+            "ldr_mse",
+            "irradiance",
+        ];
         let off: Vec<_> = off.iter().map(|name| format!("loss.{name}=0")).collect();
         let message = small[0].with_overrides(&off).unwrap().check().unwrap_err().to_string();
         assert!(message.contains("every weight is 0"), "{message}");

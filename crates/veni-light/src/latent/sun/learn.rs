@@ -6,7 +6,6 @@ use super::{
 };
 use crate::cholesky::{self, Complex};
 use crate::compact::CompactLight;
-use crate::latent::{Latent, Prior};
 
 /// Penalties that are tried, as shares of the number of samples; the whitened coordinates have variance 1.
 const PENALTIES: [f64; 7] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
@@ -15,19 +14,22 @@ const FEWEST: usize = 8;
 /// Parts of the cross-validation of the presence.
 const PARTS: usize = 5;
 
+/// w and g of a code.
+type Whitened = (Vec<Complex>, Vec<f64>);
+
 impl SunPrior {
-    /// Learns how the suns of codes depend on their vectors, in the whitened coordinates of `prior`: ridge regressions whose
+    /// Learns how suns depend on the vectors of their codes, given in whitened coordinates w and g: ridge regressions whose
     /// penalties have the least error on samples left out, with the errors of samples left out as the noise. Suns below the
     /// horizon, wider than 6° or without one of the colours count as none.
     ///
     /// None if fewer than eight codes have a sun.
     ///
     /// # Panics
-    /// If a code does not have the prior's number of vectors.
-    pub fn fit(codes: &[Latent], prior: &Prior) -> Option<Self> {
-        let n = prior.latent_vectors();
-        let whitened: Vec<_> = codes.iter().map(|code| prior.whitened(&code.vectors)).collect();
-        let suns: Vec<_> = codes.iter().map(|code| code.lights.sun().and_then(Measured::new)).collect();
+    /// If there are not as many suns as codes.
+    pub(in crate::latent) fn fit(whitened: &[Whitened], suns: &[Option<CompactLight>]) -> Option<Self> {
+        assert_eq!(whitened.len(), suns.len(), "a sun, or none, of each code");
+        let n = whitened.first()?.1.len();
+        let suns: Vec<_> = suns.iter().map(|sun| sun.as_ref().and_then(Measured::new)).collect();
         let with = || whitened.iter().zip(&suns).filter_map(|((w, g), sun)| Some((w, g, sun.as_ref()?)));
         let count = with().count();
         if count < FEWEST {

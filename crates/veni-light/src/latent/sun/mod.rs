@@ -11,20 +11,15 @@
 
 mod learn;
 mod request;
-mod tensors;
 
 pub use request::SunRequest;
-pub(crate) use tensors::schema;
 
-use super::draw::Draw;
-use super::prior::Prior;
+use super::draw::{Draw, MEASURES};
 use crate::cholesky::Complex;
 use crate::compact::{CompactLight, Kind, RadiusSource};
 use crate::luminance::{LUMINANCE as LUMINANCE_OF, luminance};
-use crate::random::{Stream, exp};
+use crate::random::exp;
 
-/// Number of measures of a sun.
-pub(crate) const MEASURES: usize = 5;
 /// Place of a measure.
 const ELEVATION: usize = 0;
 const LUMINANCE: usize = 1;
@@ -41,45 +36,17 @@ const WIDEST: f64 = 6.0 * std::f64::consts::PI / 180.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SunPrior {
     /// a, [N].
-    azimuth: Vec<[f32; 2]>,
+    pub(crate) azimuth: Vec<[f32; 2]>,
     /// σ.
-    azimuth_noise: f32,
+    pub(crate) azimuth_noise: f32,
     /// B, row-major [MEASURES, N].
-    weights: Vec<f32>,
+    pub(crate) weights: Vec<f32>,
     /// b.
-    mean: [f32; MEASURES],
+    pub(crate) mean: [f32; MEASURES],
     /// S, a lower triangle [MEASURES, MEASURES].
-    noise: [[f32; MEASURES]; MEASURES],
+    pub(crate) noise: [[f32; MEASURES]; MEASURES],
     /// p and p₀, [N + 1].
-    presence: Vec<f32>,
-}
-
-/// The random numbers behind a sun.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct SunDraw {
-    /// η.
-    presence: f64,
-    /// e, E|e|² = 1.
-    azimuth: Complex,
-    /// ξ.
-    measures: [f64; MEASURES],
-}
-
-impl SunDraw {
-    /// Number of its real numbers: presence, then measures.
-    pub(crate) const REAL: usize = 1 + MEASURES;
-
-    pub(super) fn real_mut(&mut self) -> [&mut f64; Self::REAL] {
-        let [a, b, c, d, e] = &mut self.measures;
-        [&mut self.presence, a, b, c, d, e]
-    }
-
-    pub(super) fn new(rng: &mut Stream) -> Self {
-        let [presence, _] = rng.normals();
-        let azimuth = rng.normals().map(|v| v * std::f64::consts::FRAC_1_SQRT_2);
-        let ([a, b], [c, d], [e, _]) = (rng.normals(), rng.normals(), rng.normals());
-        Self { presence, azimuth, measures: [a, b, c, d, e] }
-    }
+    pub(crate) presence: Vec<f32>,
 }
 
 impl SunPrior {
@@ -97,16 +64,11 @@ impl SunPrior {
         (sine(&t) > 0.0).then(|| self.light(self.heading(draw), t))
     }
 
-    /// The most likely sun of these vectors, and how likely it is that there is one at all.
-    ///
-    /// # Panics
-    /// If `prior` or `vectors` are not of N vectors.
-    pub fn likely(&self, prior: &Prior, vectors: &[[f32; 3]]) -> (f64, CompactLight) {
-        let (w, g) = prior.whitened(vectors);
-        let draw = Draw { w, g, exposure: 0.0, sun: SunDraw::default() };
+    /// How likely it is that there is a sun, and the most likely one, given the numbers of a draw for the vectors.
+    pub(super) fn likely(&self, draw: &Draw) -> (f64, CompactLight) {
         // the normal distribution's function by the logistic one, as it was fitted
-        let chance = 1.0 / (1.0 + exp(-LOGIT_TO_PROBIT * self.score(&draw)));
-        (chance, self.light(self.heading(&draw), self.measures(&draw)))
+        let chance = 1.0 / (1.0 + exp(-LOGIT_TO_PROBIT * self.score(draw)));
+        (chance, self.light(self.heading(draw), self.measures(draw)))
     }
 
     fn light(&self, [x, y]: Complex, t: [f64; MEASURES]) -> CompactLight {
@@ -151,13 +113,6 @@ impl SunPrior {
     fn row(&self, row: usize) -> &[f32] {
         let n = self.latent_vectors();
         &self.weights[row * n..(row + 1) * n]
-    }
-}
-
-impl Prior {
-    /// The density of the sun given the vectors, if one was fitted: random skies then have suns.
-    pub fn sun(&self) -> Option<&SunPrior> {
-        self.sun.as_ref()
     }
 }
 

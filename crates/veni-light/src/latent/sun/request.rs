@@ -1,8 +1,8 @@
 //! Suns on request. MODEL (75).
 
-use super::{ELEVATION, LUMINANCE, MEASURES, SunDraw, SunPrior, elevation_measure};
+use super::{ELEVATION, LUMINANCE, SunPrior, elevation_measure};
 use crate::cholesky::Complex;
-use crate::latent::draw::{Draw, Row};
+use crate::latent::draw::{Draw, MEASURES, Row, SunDraw};
 
 /// What is asked of the sun of a random sky; what is None is left to chance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,6 +1,8 @@
 use super::*;
 use crate::compact::Lights;
 use crate::latent::Latent;
+use crate::latent::Prior;
+use crate::random::Stream;
 
 const N: usize = 4;
 
@@ -22,6 +24,11 @@ fn truth() -> Prior {
         presence: vec![0.0, 0.0, 1.5, 0.0, 0.3],
     };
     Prior { sun: Some(sun), ..Prior::standard(N) }
+}
+
+/// What is learned of codes.
+fn fitted(codes: &[Latent]) -> Option<SunPrior> {
+    Prior::standard(N).with_suns_of(codes).sun
 }
 
 fn drawn(count: u64) -> Vec<Latent> {
@@ -48,7 +55,7 @@ fn vectors_of_a_seed_are_those_without_suns() {
 #[test]
 fn what_was_drawn_is_learned() {
     let (codes, truth) = (drawn(3000), truth());
-    let fitted = SunPrior::fit(&codes, &Prior::standard(N)).unwrap();
+    let fitted = fitted(&codes).unwrap();
     let sun = truth.sun().unwrap();
     // the heading is of length 1 in the fit: a by its scale, which the noise has too
     let scale = fitted.azimuth[0][0] / sun.azimuth[0][0];
@@ -66,7 +73,7 @@ fn what_was_drawn_is_learned() {
 fn turning_the_codes_turns_the_suns_and_changes_no_fit() {
     let codes = drawn(300);
     let turned: Vec<_> = codes.iter().enumerate().map(|(i, code)| code.rotated(i as f64)).collect();
-    let (a, b) = [&codes, &turned].map(|codes| SunPrior::fit(codes, &Prior::standard(N)).unwrap()).into();
+    let (a, b) = [&codes, &turned].map(|codes| fitted(codes).unwrap()).into();
     assert!(a.azimuth.as_flattened().iter().zip(b.azimuth.as_flattened()).all(|(a, b)| (a - b).abs() < 1e-5));
     assert_eq!((a.weights, a.presence), (b.weights, b.presence));
     // a break: suns that did not turn with their codes say nothing
@@ -74,7 +81,7 @@ fn turning_the_codes_turns_the_suns_and_changes_no_fit() {
         .iter()
         .zip(&turned)
         .map(|(code, turned)| Latent { lights: code.lights.clone(), ..turned.clone() });
-    let broken = SunPrior::fit(&still.collect::<Vec<_>>(), &Prior::standard(N)).unwrap();
+    let broken = fitted(&still.collect::<Vec<_>>()).unwrap();
     assert!(
         broken.azimuth_noise > 0.9 && a.azimuth_noise < 0.7,
         "{} {}",
@@ -86,12 +93,12 @@ fn turning_the_codes_turns_the_suns_and_changes_no_fit() {
 #[test]
 fn too_few_suns_teach_nothing() {
     let codes: Vec<_> = drawn(40).into_iter().filter(|latent| latent.lights.sun().is_some()).collect();
-    assert!(SunPrior::fit(&codes[..7], &Prior::standard(N)).is_none());
-    let some = SunPrior::fit(&codes[..8], &Prior::standard(N)).unwrap();
+    assert!(fitted(&codes[..7]).is_none());
+    let some = fitted(&codes[..8]).unwrap();
     assert!(some.presence[..N].iter().all(|p| *p == 0.0) && some.presence[N] > 0.5, "{some:?}");
     let dark: Vec<_> =
         codes.iter().map(|code| Latent { lights: Lights::default(), ..code.clone() }).collect();
-    assert!(SunPrior::fit(&dark, &Prior::standard(N)).is_none());
+    assert!(fitted(&dark).is_none());
 }
 
 /// A code whose sun is as asked: presence and elevation by one step, the azimuth by another.
@@ -181,10 +188,9 @@ fn another_azimuth_is_the_same_place() {
 #[test]
 fn the_likely_sun_is_near_the_drawn_one() {
     let truth = truth();
-    let sun = truth.sun().unwrap();
     let (mut right, mut sunny, mut error, mut likely) = (0, 0, 0.0, 0.0);
     for latent in drawn(500) {
-        let (chance, guess) = sun.likely(&truth, &latent.vectors);
+        let (chance, guess) = truth.likely_sun(&latent.vectors).unwrap();
         let there = latent.lights.sun();
         right += i32::from((chance > 0.5) == there.is_some());
         likely += chance;
