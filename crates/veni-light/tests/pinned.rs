@@ -54,9 +54,9 @@ fn a_baked_sky_keeps_its_bits() {
     let found =
         [[32, 16], [32, 0], [32, 31]].map(|[column, row]| sky[row * grid.width + column].map(f32::ln));
     let pinned = [
-        [-1.594_466_4, -1.513_554_1, -1.184_415_8],
-        [-3.373_522_3, -2.947_671, -2.095_261],
-        [-3.338_585, -2.972_611_2, -2.317_13f32],
+        [-0.223_055_33, -0.609_893_5, -0.673_748_1],
+        [-5.459_405, -5.163_466, -4.212_381],
+        [-0.370_579, -0.760_343_7, -0.757_274_6f32],
     ];
     let pairs = found.as_flattened().iter().zip(pinned.as_flattened());
     assert!(pairs.clone().all(|(a, b)| (a - b).abs() < 1e-4), "log radiance is now {found:?}");

@@ -171,7 +171,9 @@ fn levels_are_those_of_the_cpu_in_every_frame() {
             // seen along other axes, or another way round, it is another cube
             let other = if frame == Frame::Gltf { CubeAxes::NATIVE } else { CubeAxes::GLTF };
             let other = cpu.level(p, levels.size(level), other);
-            assert!(relative(&found, &double(other.texels())) > 0.1);
+            let apart = relative(&found, &double(other.texels()));
+            // the roughest level of an even sky hardly differs
+            assert!(apart > if level == 1 { 0.15 } else { 0.05 }, "{frame:?}, level {level}: {apart}");
         }
         // the first level is the field
         let first = gpu.level(&chain, 0);
