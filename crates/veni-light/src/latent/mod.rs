@@ -9,13 +9,22 @@ mod draw;
 mod file;
 mod lobe;
 mod prior;
+#[cfg(feature = "gradients")]
+mod step;
 mod sun;
 
-pub(crate) use draw::{Draw, MEASURES, Row};
+#[cfg(feature = "gradients")]
+pub(crate) use draw::Draw;
+pub(crate) use draw::MEASURES;
 pub use file::MAX_LATENT_BYTES;
 pub use lobe::Lobe;
 pub use prior::Prior;
-pub use sun::{SunPrior, SunRequest};
+#[cfg(feature = "gradients")]
+pub(crate) use step::Row;
+pub use sun::SunPrior;
+#[cfg(feature = "gradients")]
+pub use sun::SunRequest;
+#[cfg(feature = "gradients")]
 pub(crate) use sun::{irradiance, sine};
 
 use crate::compact::Lights;

@@ -6,9 +6,9 @@
 //! C = L Lᴴ, Σ = K Kᵀ, w circular complex normal (E|w|² = 1) and g standard normal.
 
 use super::Latent;
-#[cfg(feature = "gradients")]
-use super::draw::Row;
 use super::draw::{Draw, SunDraw};
+#[cfg(feature = "gradients")]
+use super::step::Row;
 use super::sun::SunPrior;
 use crate::cholesky::{self, Complex, Scalar};
 use crate::compact::{CompactLight, Lights};
@@ -104,7 +104,8 @@ impl Prior {
         })
     }
 
-    /// The same with the suns of `codes`, which are conditioned on their vectors ([`SunPrior::fit`]).
+    /// The same with a density of the sun given the vectors, learned from the suns of `codes`; without one if fewer than eight of them
+    /// have a sun.
     ///
     /// # Panics
     /// If a code does not have N vectors.

@@ -10,8 +10,10 @@
 //! A turn of the code multiplies w by e^{iα} and with it the sun's direction: the density is equivariant, exactly.
 
 mod learn;
+#[cfg(feature = "gradients")]
 mod request;
 
+#[cfg(feature = "gradients")]
 pub use request::SunRequest;
 
 use super::draw::{Draw, MEASURES};
@@ -32,7 +34,8 @@ const MARGIN: f64 = 0.1;
 /// Widest sun that is drawn, radians: 6°.
 const WIDEST: f64 = 6.0 * std::f64::consts::PI / 180.0;
 
-/// Density of a sky's sun given its vectors; see the [module](self).
+/// Density of a sky's sun given its vectors: azimuth, elevation, luminance, colour and radius are linear in the whitened vectors plus
+/// normal noise, and so is the score of whether there is one (docs/MODEL.md (74)). It rotates with them, exactly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SunPrior {
     /// a, [N].
@@ -145,5 +148,5 @@ fn dot(a: &[f32], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| f64::from(*a) * b).sum()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "gradients"))]
 mod tests;

@@ -2,7 +2,8 @@
 
 use super::{ELEVATION, LUMINANCE, SunPrior, elevation_measure};
 use crate::cholesky::Complex;
-use crate::latent::draw::{Draw, MEASURES, Row, SunDraw};
+use crate::latent::draw::{Draw, MEASURES, SunDraw};
+use crate::latent::step::Row;
 
 /// What is asked of the sun of a random sky; what is None is left to chance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
