@@ -1,5 +1,6 @@
 //! `veni-cli fit`: pictures, and what else is known of a light, to latents, by optimisation.
 
+mod band_sun;
 mod completed;
 mod input;
 mod integrals;
@@ -33,7 +34,7 @@ use crate::source;
 
 pub(crate) use input::Input;
 use integrals::Integrals;
-use lit::{Lit, LitArgs};
+use lit::{Lit, LitArgs, Seen};
 use model::FitModel;
 use rendered::Rendered;
 use settings::{Settings, Start};
@@ -179,41 +180,28 @@ impl Fit {
         let mut fitted = match &self.rendered.normals {
             Some(normals) => self.fit_light(path, normals, &picture, model, config, report)?,
             None => {
-                let grid = self.settings.grid(picture.is_partial())?;
-                let most = self.lit.most(model.lights(), &picture, self.input.view().is_some(), report);
+                let (grid, view) = (self.settings.grid(picture.is_partial())?, self.input.view());
+                let most = self.lit.most(model.lights(), &picture, view.is_some(), report);
                 let lit = Lit::new(&picture, most).map_err(|e| e.in_file(path))?;
                 let rest = lit.rest.as_ref().unwrap_or(&picture);
                 let observation = self.input.observe(rest, grid).map_err(|e| e.in_file(path))?;
-                let (mask, view) = (observation.mask().map(<[f32]>::to_vec), self.input.view());
+                let mask = observation.mask().map(<[f32]>::to_vec);
                 let mut fitted = self.fit(path, observation, model, config, report)?;
                 lit.put_into(&mut fitted.best);
                 if lit.rest.is_none() {
-                    let is_seen = |direction| match (view, &mask) {
-                        (Some(view), _) => {
-                            let [width, height] = picture.size();
-                            view.pixel_of(direction, width, height).is_some()
-                        }
-                        (None, Some(mask)) => {
-                            let [column, row] = grid.pixel(direction).map(|v| v as usize);
-                            mask[row.min(grid.height - 1) * grid.width + column] > 0.5
-                        }
-                        (None, None) => true,
-                    };
-                    self.lit.guess(&model.prior(), &mut fitted.best, is_seen, report)?;
+                    let seen = Seen { view, mask, grid, size: picture.size() };
+                    self.lit.guess(&model.prior(), &mut fitted.best, &seen, report)?;
                 }
                 if !lit.lights.is_empty() && fitted.scores.is_some() {
                     let whole = self.input.observe(&picture, grid).map_err(|e| e.in_file(path))?;
-                    // at the exposure of what it is compared with
-                    let mut latent = fitted.best.latent.clone();
-                    latent.log_exposure -= whole.log_exposure();
-                    fitted.scores = Some(model.score(&latent, &whole)?);
+                    fitted.scores = Some(model.score_exposed(&fitted.best.latent, &whole)?);
                 }
                 fitted
             }
         };
         self.integrals.scale(model, &mut fitted.best)?;
-        let seen = Some(&picture).filter(|_| self.rendered.normals.is_none());
-        self.keep(&mut fitted.best, path, output, seen, model)?;
+        let shown = self.rendered.normals.is_none().then_some(&picture);
+        self.keep(&mut fitted.best, path, output, shown, model)?;
         self.print(path, output, &fitted, report)
     }
 
@@ -393,17 +381,14 @@ impl Fit {
         let Some(output) = output else {
             return lines_to_stdout(&format!("{}\n", printable_json(&text)));
         };
-        let stops = best.latent.log_exposure / std::f32::consts::LN_2;
-        let n = best.latent.vectors.len();
+        let (n, stops) = (best.latent.vectors.len(), best.latent.log_exposure / std::f32::consts::LN_2);
         let quality = match (scores, known) {
             (Some(s), _) => format!("LDR PSNR {:.1} dB", s.ldr_psnr),
             (None, Some(known)) => format!("{:.0} % of the sphere known", 100.0 * known),
             (None, None) => "from a rendered image".to_owned(),
         };
-        let starts = match best.all.len() {
-            1 => String::new(),
-            count => format!(", best of {count} starts"),
-        };
+        let count = best.all.len();
+        let starts = if count > 1 { format!(", best of {count} starts") } else { String::new() };
         report.result(
             format!(
                 "{}: {n} vectors, exposure {stops:+.2} stops, loss {:.4}, {quality}{starts} ({seconds:.1} s)",

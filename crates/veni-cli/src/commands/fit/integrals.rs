@@ -11,6 +11,7 @@ use veni_fit::{Achieved, Best, FitConfig, LinearTarget, Received, best_linear, r
 use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
 
+use super::band_sun::{BandSun, SHARES};
 use super::model::FitModel;
 use super::settings::{Settings, Start};
 use crate::numbers::positive;
@@ -49,6 +50,16 @@ pub(super) struct Integrals {
     illuminance: Option<f64>,
 }
 
+/// Harmonics that are further from what is wanted than this are tried with a sun.
+const NEAR: f64 = 0.01;
+
+/// What is to be fitted.
+struct Wanted {
+    target: LinearTarget,
+    harmonics: Vec<[f64; 3]>,
+    normals: Vec<[f32; 3]>,
+}
+
 /// What a fit has reached.
 pub(super) struct Reached {
     pub(super) best: Best,
@@ -72,12 +83,13 @@ impl Integrals {
             .unwrap_or_else(|| "illuminance".into())
     }
 
-    /// What is wanted, and the normals of the surfaces.
-    fn read(&self, grid: Equirect) -> Result<(LinearTarget, Vec<[f32; 3]>)> {
-        let mut target = LinearTarget::new(grid);
+    /// What is wanted: the target, its harmonics and the normals of its surfaces.
+    fn read(&self, grid: Equirect) -> Result<Wanted> {
+        let (mut target, mut harmonics) = (LinearTarget::new(grid), Vec::new());
         if let Some(path) = &self.target_sh {
             let path = piped::input(path)?;
-            target = target.harmonics(&read_harmonics(&path)?).map_err(|e| e.in_file(&path))?;
+            harmonics = read_harmonics(&path)?;
+            target = target.harmonics(&harmonics).map_err(|e| e.in_file(&path))?;
         }
         let surfaces = match (&self.target_irradiance, &self.target_sh, self.illuminance) {
             (Some(path), _, _) => {
@@ -93,21 +105,43 @@ impl Integrals {
             }
             _ => Vec::new(),
         };
-        Ok((target, surfaces.into_iter().map(|(normal, _)| normal).collect()))
+        Ok(Wanted { target, harmonics, normals: surfaces.into_iter().map(|(normal, _)| normal).collect() })
     }
 
     /// Finds a latent with these integrals.
     pub(super) fn fit(&self, settings: &Settings, model: &FitModel, report: Report) -> Result<Reached> {
         let started = Instant::now();
         let grid = settings.grid(false)?;
-        let (target, normals) = self.read(grid)?;
+        let Wanted { target, harmonics, normals } = self.read(grid)?;
         let config = settings.for_integrals(model.decoder().folded().is_some())?;
-        let mut starts = starts(settings, model)?;
-        for start in &mut starts {
-            start.log_exposure += target.matching_exposure(&model.decode(grid, start)?);
+        let starts = starts(settings, model)?;
+        let found = |target: &LinearTarget| -> Result<(Best, Achieved)> {
+            let mut starts = starts.clone();
+            for start in &mut starts {
+                start.log_exposure += target.matching_exposure(&model.decode(grid, start)?);
+            }
+            let best = Self::search(target, &starts, &config, model, report)?;
+            let achieved = target.achieved(&model.decode(grid, &best.latent)?);
+            Ok((best, achieved))
+        };
+        let (mut best, mut achieved) = found(&target)?;
+        // the vectors of a model that was trained without suns cannot be as bright on one side
+        let sun = BandSun::new(&harmonics).filter(|_| normals.is_empty() && model.prior().sun().is_some());
+        for share in SHARES {
+            let (Some(sun), Some(NEAR..)) = (sun, achieved.harmonics_error) else { break };
+            let own = sun.harmonics(share, harmonics.len());
+            let rest = harmonics.iter().zip(&own).map(|(all, sun)| [0, 1, 2].map(|c| all[c] - sun[c]));
+            let rest: Vec<[f64; 3]> = rest.collect();
+            let (mut other, mut reached) = found(&LinearTarget::new(grid).harmonics(&rest)?)?;
+            let error = reached.harmonics_error.map(|error| error * norm(&rest) / norm(&harmonics));
+            if error < achieved.harmonics_error {
+                sun.put_into(share, &mut other);
+                reached.harmonics.iter_mut().zip(&own).for_each(|(sum, sun)| {
+                    *sum = [0, 1, 2].map(|c| sum[c] + sun[c]);
+                });
+                (best, achieved) = (other, Achieved { harmonics_error: error, ..reached });
+            }
         }
-        let best = Self::search(&target, &starts, &config, model, report)?;
-        let achieved = target.achieved(&model.decode(grid, &best.latent)?);
         let mut reached = Reached { best, achieved, normals, seconds: 0.0 };
         let factor = self.scale(model, &mut reached.best)?;
         let numbers = reached.achieved.harmonics.iter_mut().chain(&mut reached.achieved.surfaces);
@@ -191,6 +225,10 @@ impl Integrals {
         });
         Ok((line, value))
     }
+}
+
+fn norm(values: &[[f64; 3]]) -> f64 {
+    values.as_flattened().iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
 /// Where the search begins: at 0, and at random if more starts are asked for.

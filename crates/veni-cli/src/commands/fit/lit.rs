@@ -6,7 +6,7 @@ use veni_image::Picture;
 use veni_light::Result;
 use veni_light::latent::{Latent, Prior};
 use veni_light::light::{LightOptions, Lights};
-use veni_light::sphere::Equirect;
+use veni_light::sphere::{Equirect, View};
 
 use crate::report::Report;
 
@@ -39,13 +39,12 @@ impl LitArgs {
         if whole { most } else { 0 }
     }
 
-    /// The likely sun of every latent of a fit, if that is asked for. `is_seen`: whether a direction is in the picture, where a
-    /// sun would have been seen.
+    /// The likely sun of every latent of a fit, if that is asked for, where it would not have been seen.
     pub(super) fn guess(
         &self,
         prior: &Prior,
         best: &mut Best,
-        is_seen: impl Fn([f32; 3]) -> bool,
+        seen: &Seen,
         report: Report,
     ) -> anyhow::Result<()> {
         if !self.likely_sun {
@@ -56,7 +55,7 @@ impl LitArgs {
         }
         let likely = |latent: &Latent| {
             let found = prior.likely_sun(&latent.vectors)?;
-            (found.0 > 0.5 && !is_seen(found.1.direction)).then_some(found)
+            (found.0 > 0.5 && !seen.has(found.1.direction)).then_some(found)
         };
         for latent in &mut best.all {
             latent.lights = Lights::new(likely(latent).map(|(_, light)| light), []);
@@ -73,6 +72,33 @@ impl LitArgs {
         }
         best.latent.lights = Lights::new(found.map(|(_, light)| light), []);
         Ok(())
+    }
+}
+
+/// The part of the sphere that a picture shows.
+pub(super) struct Seen {
+    /// Of a photograph.
+    pub(super) view: Option<View>,
+    /// Of part of a panorama: how much of each pixel of `grid` is known.
+    pub(super) mask: Option<Vec<f32>>,
+    pub(super) grid: Equirect,
+    /// Of the picture, pixels.
+    pub(super) size: [usize; 2],
+}
+
+impl Seen {
+    fn has(&self, direction: [f32; 3]) -> bool {
+        match (self.view, &self.mask) {
+            (Some(view), _) => {
+                let [width, height] = self.size;
+                view.pixel_of(direction, width, height).is_some()
+            }
+            (None, Some(mask)) => {
+                let [column, row] = self.grid.pixel(direction).map(|v| v as usize);
+                mask[row.min(self.grid.height - 1) * self.grid.width + column] > 0.5
+            }
+            (None, None) => true,
+        }
     }
 }
 

@@ -99,6 +99,12 @@ impl FitModel {
         Ok(scores(&decoded, seen.log_radiance(), height, width, Alignment::LogFactor))
     }
 
+    /// The same of a latent at the exposure of the picture.
+    pub(super) fn score_exposed(&self, latent: &Latent, seen: &Observation) -> Result<Scores> {
+        let log_exposure = latent.log_exposure - seen.log_exposure();
+        self.score(&Latent { log_exposure, ..latent.clone() }, seen)
+    }
+
     /// The best of the fits from every start.
     pub(super) fn best_of(
         &self,
