@@ -163,9 +163,8 @@ impl Fit {
         };
         named(&self.completed, &["exr", "hdr", "png"])?;
         named(&self.uncertainty, &["exr", "png"])?;
-        output::check_distinct(
-            &[&self.completed, &self.uncertainty].into_iter().flatten().cloned().collect::<Vec<_>>(),
-        )
+        let both: Vec<_> = [&self.completed, &self.uncertainty].into_iter().flatten().cloned().collect();
+        output::check_distinct(&both)
     }
 
     fn one(

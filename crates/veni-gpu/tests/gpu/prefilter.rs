@@ -98,7 +98,7 @@ fn harmonics_are_those_of_the_panorama() {
     let Some(gpu) = plain() else { return };
     let model = pretrained();
     let decoder = GpuDecoder::new(&gpu.opened.device, &model).unwrap();
-    let seeds = [19, 7];
+    let seeds = [19, 8];
     let latents = seeds.map(|seed| sky(&model, seed));
     for degree in [2, 24, GpuPrefilter::DEGREE] {
         let prefilter = GpuPrefilter::with_degree(&gpu.opened.device, degree).unwrap();
@@ -118,7 +118,7 @@ fn harmonics_are_those_of_the_panorama() {
                 "degree {degree}: nine harmonics within {nine:.1e}, all within {all:.1e}, relative RMS"
             ));
             // what is beyond the largest degree comes back as a little of what is below it
-            assert!(nine < 1e-3 && all < 6e-3, "degree {degree}: {nine:e} {all:e}");
+            assert!(nine < 1e-3 && all < 4e-3, "degree {degree}: {nine:e} {all:e}");
             // of another sky they are far off
             let other = model.decoder().unwrap().condition(&sky(&model, 5)).unwrap().bake(FINE);
             let other = EnvironmentMap::new(FINE, &other).unwrap();
@@ -137,11 +137,11 @@ fn levels_are_those_of_the_cpu_in_every_frame() {
     let prefilter = GpuPrefilter::new(device).unwrap();
     let angle = 0.7;
     for (frame, format, size, count, seed) in [
-        (Frame::Blender, TextureFormat::Rgba32Float, 64, 5, 19),
-        (Frame::Blender, TextureFormat::Rgba32Float, 64, 5, 7),
-        (Frame::Gltf, TextureFormat::Rgba16Float, 16, 3, 19),
-        (Frame::OpenExr, TextureFormat::Rgba32Float, 16, 3, 19),
-        (Frame::Bevy, TextureFormat::Rgba32Float, 16, 3, 19),
+        (Frame::Blender, TextureFormat::Rgba32Float, 64, 5, 8),
+        (Frame::Blender, TextureFormat::Rgba32Float, 64, 5, 3),
+        (Frame::Gltf, TextureFormat::Rgba16Float, 16, 3, 8),
+        (Frame::OpenExr, TextureFormat::Rgba32Float, 16, 3, 8),
+        (Frame::Bevy, TextureFormat::Rgba32Float, 16, 3, 8),
     ] {
         let latent = sky(&model, seed);
         let pixels = model.decoder().unwrap().condition(&latent.rotated(angle)).unwrap().bake(FINE);
@@ -169,11 +169,11 @@ fn levels_are_those_of_the_cpu_in_every_frame() {
             // halves have eleven bits; what the lobe keeps beyond degree 64 is missing
             assert!(off < if level == 1 { 0.01 } else { 2e-3 }, "{frame:?}, level {level}: {off:e}");
             // seen along other axes, or another way round, it is another cube
-            let other = if frame == Frame::Gltf { CubeAxes::NATIVE } else { CubeAxes::GLTF };
+            // Bevy's are glTF's mirrored, which many a sky hardly shows
+            let same_up = matches!(frame, Frame::Gltf | Frame::Bevy);
+            let other = if same_up { CubeAxes::NATIVE } else { CubeAxes::GLTF };
             let other = cpu.level(p, levels.size(level), other);
-            let apart = relative(&found, &double(other.texels()));
-            // the roughest level of an even sky hardly differs
-            assert!(apart > if level == 1 { 0.15 } else { 0.02 }, "{frame:?}, level {level}: {apart}");
+            assert!(relative(&found, &double(other.texels())) > 0.3, "{frame:?}, level {level}");
         }
         // the first level is the field
         let first = gpu.level(&chain, 0);

@@ -118,7 +118,7 @@ fn a_light_is_found_again_by_its_integrals_with_either_method() {
     let model = Model::pretrained();
     let decoder = model.decoder().unwrap();
     // of the vectors: what a sun adds no fit of integrals looks for
-    let truth = Latent::new(Latent::from_seed(&model.prior(), 5).vectors);
+    let truth = Latent::new(Latent::from_seed(&model.prior(), 6).vectors);
     let light = |light: &Latent| {
         let mut out = vec![[0.0; 3]; GRID.len()];
         decoder.condition(light).unwrap().log_radiance_batch(&GRID.directions(), &mut out);
@@ -145,7 +145,7 @@ fn a_light_is_found_again_by_its_integrals_with_either_method() {
     };
     let before = target.achieved(&light(&start)).harmonics_error.unwrap();
     let (marquardt, adam) = (run(Method::Auto), run(Method::Adam));
-    assert!(before > 0.1 && marquardt.0 < 2e-3, "{marquardt:?} from {before}");
+    assert!(before > 0.1 && marquardt.0 < 1e-3, "{marquardt:?} from {before}");
     // which makes as many steps here, and needs ten times as many
     assert!(adam.0 < 0.5 * before, "{adam:?} from {before}");
 }
