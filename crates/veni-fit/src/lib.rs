@@ -35,8 +35,9 @@ pub use adam::Adam;
 pub use encoder::{Encoded, Encoder};
 pub use fit::{
     Achieved, Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient,
-    LinearTarget, Method, Objective, PanoramaLoss, Plateau, Received, best_light, best_linear, best_of, fit,
-    fit_linear, fit_rendered, fit_with, from_each, likely_linear, matching_exposure, random_starts,
+    LinearTarget, LobePlan, Method, Objective, PanoramaLoss, Plateau, Received, best_light, best_linear,
+    best_of, fit, fit_linear, fit_lobes, fit_rendered, fit_with, from_each, likely_linear, matching_exposure,
+    random_starts,
 };
 pub use observation::Observation;
 pub use veni_light::{Error, Result};

@@ -19,7 +19,7 @@ pub(super) fn optimise(
 ) -> Result<FitResult> {
     let n = start.first().map_or(0, |z| z.vectors.len());
     let standard = Prior::standard(n);
-    let penalty = Penalty { prior: prior.unwrap_or(&standard), scale: config.prior / n.max(1) as f64 };
+    let penalty = Penalty::new(prior.unwrap_or(&standard), config);
     let applies = network.is_folded() && loss.has_equations();
     if config.method == Method::LevenbergMarquardt && !applies {
         return Err(unsuited(loss));
@@ -48,14 +48,19 @@ fn unsuited(loss: &ImageLoss<'_>) -> Error {
 }
 
 /// scale · (−ln p) of a latent.
-struct Penalty<'a> {
+pub(super) struct Penalty<'a> {
     prior: &'a Prior,
     scale: f64,
 }
 
-impl Penalty<'_> {
+impl<'a> Penalty<'a> {
+    /// With the weight of the configuration.
+    pub(super) fn new(prior: &'a Prior, config: &FitConfig) -> Self {
+        Self { prior, scale: config.prior / prior.latent_vectors().max(1) as f64 }
+    }
+
     /// Its value and gradient.
-    fn at(&self, vectors: &[[f32; 3]]) -> (f64, Vec<f64>) {
+    pub(super) fn at(&self, vectors: &[[f32; 3]]) -> (f64, Vec<f64>) {
         if self.scale == 0.0 {
             return (0.0, vec![0.0; 3 * vectors.len()]);
         }
@@ -64,7 +69,7 @@ impl Penalty<'_> {
     }
 
     /// Its Hessian, [3N, 3N]: the same everywhere, since it is a quadratic.
-    fn hessian(&self) -> Vec<f64> {
+    pub(super) fn hessian(&self) -> Vec<f64> {
         let n = self.prior.latent_vectors();
         let mut vectors = vec![[0.0; 3]; n];
         let (_, origin) = self.at(&vectors);
@@ -163,7 +168,7 @@ impl Descent<'_> {
         let evaluate = |latent: &Latent, b: usize| -> Result<QuadraticModel> {
             let found = self.network.equations(latent, self.loss, b)?;
             let (value, by) = self.penalty.at(&latent.vectors);
-            Ok(QuadraticModel::new(found, free).plus(value, &by, &hessian))
+            Ok(QuadraticModel::new(found, latent.vectors.len(), free).plus(value, &by, &hessian))
         };
         let begin = |(b, latent): (usize, &Latent)| -> Result<Search> {
             Ok(Search::new(latent.clone(), evaluate(latent, b)?))

@@ -8,7 +8,7 @@
 use crate::Result;
 use veni_light::cholesky;
 use veni_light::field::{MAX_COORDINATE, NormalEquations};
-use veni_light::latent::Latent;
+use veni_light::latent::{Latent, Lobe};
 
 /// λ at first.
 const DAMPING: f64 = 1e-2;
@@ -26,18 +26,30 @@ pub(super) struct QuadraticModel {
     value: f64,
     gradient: Vec<f64>,
     matrix: Vec<f64>,
+    /// The number of vectors among the coordinates, which come first.
+    vectors: usize,
+    /// Whether the exposure follows them; lobes come last.
+    free: bool,
 }
 
 impl QuadraticModel {
-    /// With the exposure as the last coordinate, if it is `free`.
-    pub(super) fn new(equations: NormalEquations, free: bool) -> Self {
+    /// Of `vectors` vectors, the exposure if it is `free`, and the lobes if the equations have them.
+    pub(super) fn new(equations: NormalEquations, vectors: usize, free: bool) -> Self {
         let NormalEquations { loss: value, mut gradient, mut matrix } = equations;
         if !free {
-            let n = gradient.len();
-            gradient.pop();
-            matrix = matrix.chunks_exact(n).take(n - 1).flat_map(|row| &row[..n - 1]).copied().collect();
+            let (n, exposure) = (gradient.len(), 3 * vectors);
+            gradient.remove(exposure);
+            let kept = matrix.iter().enumerate().filter(|(k, _)| k / n != exposure && k % n != exposure);
+            matrix = kept.map(|(_, value)| *value).collect();
         }
-        Self { value, gradient, matrix }
+        Self { value, gradient, matrix, vectors, free }
+    }
+
+    /// That of the lobes alone.
+    pub(super) fn of_lobes(self) -> Self {
+        let (n, first) = (self.gradient.len(), 3 * self.vectors + usize::from(self.free));
+        let matrix = self.matrix.chunks_exact(n).skip(first).flat_map(|row| &row[first..]).copied().collect();
+        Self { gradient: self.gradient[first..].to_vec(), matrix, vectors: 0, free: false, ..self }
     }
 
     /// With a penalty on the vectors' coordinates added.
@@ -47,6 +59,20 @@ impl QuadraticModel {
         self.gradient.iter_mut().zip(gradient).for_each(|(g, by)| *g += by);
         for (row, more) in self.matrix.chunks_exact_mut(n).zip(hessian.chunks_exact(m)) {
             row.iter_mut().zip(more).for_each(|(h, more)| *h += more);
+        }
+        self
+    }
+
+    /// With weight · |a|² added for the amplitude a of every lobe.
+    pub(super) fn with_small_lobes(mut self, latent: &Latent, weight: f64) -> Self {
+        let (n, first) = (self.gradient.len(), 3 * self.vectors + usize::from(self.free));
+        for (k, lobe) in latent.lobes.iter().enumerate() {
+            for (c, amplitude) in lobe.amplitude.into_iter().enumerate() {
+                let (amplitude, at) = (f64::from(amplitude), first + Lobe::COORDINATES * k + c);
+                self.value += weight * amplitude * amplitude;
+                self.gradient[at] += 2.0 * weight * amplitude;
+                self.matrix[at * (n + 1)] += 2.0 * weight;
+            }
         }
         self
     }
@@ -77,11 +103,19 @@ pub(super) struct Search {
     damping: f64,
     growth: f64,
     idle: u32,
+    /// The least and the largest of a lobe.
+    sharpness: [f32; 2],
 }
 
 impl Search {
     pub(super) fn new(latent: Latent, at: QuadraticModel) -> Self {
-        Self { latent, at, damping: DAMPING, growth: 2.0, idle: 0 }
+        let sharpness = [f32::MIN_POSITIVE, f32::MAX];
+        Self { latent, at, damping: DAMPING, growth: 2.0, idle: 0, sharpness }
+    }
+
+    /// With lobes of sharpnesses from `least` to `largest`.
+    pub(super) fn with_sharpness(self, [least, largest]: [f32; 2]) -> Self {
+        Self { sharpness: [least, largest], ..self }
     }
 
     /// The loss, prior included.
@@ -126,10 +160,18 @@ impl Search {
 
     fn moved(&self, step: &[f64]) -> Latent {
         let mut moved = self.latent.clone();
-        let exposure = step.get(3 * moved.vectors.len()).copied().unwrap_or(0.0);
-        moved.log_exposure = (f64::from(moved.log_exposure) + exposure) as f32;
-        for (value, step) in moved.vectors.as_flattened_mut().iter_mut().zip(step) {
+        let (by_vectors, mut rest) = step.split_at(3 * self.at.vectors);
+        for (value, step) in moved.vectors.as_flattened_mut().iter_mut().zip(by_vectors) {
             *value = (f64::from(*value) + step) as f32;
+        }
+        if let (true, [exposure, lobes @ ..]) = (self.at.free, rest) {
+            moved.log_exposure = (f64::from(moved.log_exposure) + exposure) as f32;
+            rest = lobes;
+        }
+        // without lobes' coordinates they stay as they are
+        for (lobe, by) in moved.lobes.iter_mut().zip(rest.as_chunks().0) {
+            *lobe = lobe.moved(by);
+            lobe.sharpness = lobe.sharpness.clamp(self.sharpness[0], self.sharpness[1]);
         }
         moved
     }

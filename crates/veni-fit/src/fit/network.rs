@@ -126,11 +126,9 @@ impl<'a> Network<'a> {
         };
         let field = decoder.condition(latent)?;
         match loss {
-            ImageLoss::Pixels(images) => Ok(field.normal_equations(directions, |i, p| {
-                let value = images[b].at(i, p.map(f64::from));
-                let [gradient, weight] = [value.gradient, value.gauss_newton].map(|v| v.map(|v| v as f32));
-                LocalQuadratic { loss: value.loss, gradient, weight }
-            })),
+            ImageLoss::Pixels(images) => {
+                Ok(field.normal_equations(directions, |i, p| local_quadratic(&images[b], i, p)))
+            }
             ImageLoss::Linear(target) => {
                 let (weights, count) = target.weights();
                 Ok(target.equations(&field.moments(directions, weights, count)))
@@ -156,6 +154,13 @@ impl<'a> Network<'a> {
             }
         })
     }
+}
+
+/// A pixel's part of a loss around its log radiance.
+pub(super) fn local_quadratic(image: &PixelLoss<'_>, pixel: usize, prediction: [f32; 3]) -> LocalQuadratic {
+    let value = image.at(pixel, prediction.map(f64::from));
+    let [gradient, weight] = [value.gradient, value.gauss_newton].map(|v| v.map(|v| v as f32));
+    LocalQuadratic { loss: value.loss, gradient, weight }
 }
 
 fn without_exposure(latents: &[Latent]) -> Vec<Latent> {

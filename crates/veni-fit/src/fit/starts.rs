@@ -130,11 +130,11 @@ pub fn from_each(
 }
 
 impl Best {
-    /// The best of these.
+    /// The best of these latents of one image by their losses.
     ///
     /// # Panics
     /// If there is none, or not one loss for each.
-    fn of(all: Vec<Latent>, losses: Vec<f64>) -> Self {
+    pub fn of(all: Vec<Latent>, losses: Vec<f64>) -> Self {
         assert!(!all.is_empty() && all.len() == losses.len(), "a loss for each of at least one latent");
         let best = (0..all.len()).min_by(|a, b| losses[*a].total_cmp(&losses[*b])).unwrap_or(0);
         Self { latent: all[best].clone(), loss: losses[best], all, losses }

@@ -187,6 +187,20 @@ impl<'a> FitTarget<'a> {
         }
     }
 
+    /// The smallest angle between neighbouring pixels in the middle of the images, radians.
+    pub(super) fn spacing(&self) -> f32 {
+        let Equirect { width, height } = self.grid;
+        let directions = self.directions();
+        let middle = height / 2 * width + width / 2;
+        let beside = [width > 1, height > 1].into_iter().zip([1, width]).filter(|(is, _)| *is);
+        let angle = |step: usize| -> f32 {
+            // the chord is exact where the cosine has no digits left
+            let pair = directions[middle].iter().zip(&directions[middle - step]);
+            pair.map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt()
+        };
+        beside.map(|(_, step)| angle(step)).fold(std::f32::consts::PI, f32::min)
+    }
+
     /// That every value that counts is finite: last, since where nothing counts anything may stand.
     pub(super) fn check_finite(&self) -> Result<()> {
         for (b, TargetImage { log_radiance, mask, .. }) in self.images.iter().enumerate() {

@@ -35,12 +35,18 @@ pub(super) fn add_one<S: Simd>(simd: S, lobes: &[Lobe], direction: [f32; 3], rgb
 
 #[inline(always)]
 fn gauss<S: Simd>(simd: S, lobe: &Lobe, direction: [S::f32s; 3]) -> S::f32s {
+    math::exp(simd, exponent(simd, lobe, direction))
+}
+
+/// s(⟨d,u⟩ − 1).
+#[inline(always)]
+pub(super) fn exponent<S: Simd>(simd: S, lobe: &Lobe, direction: [S::f32s; 3]) -> S::f32s {
     let mut square = simd.splat_f32s(0.0);
     for (d, u) in direction.into_iter().zip(lobe.direction) {
         let difference = simd.sub_f32s(d, simd.splat_f32s(u));
         square = simd.mul_add_e_f32s(difference, difference, square);
     }
-    math::exp(simd, simd.mul_f32s(square, simd.splat_f32s(-0.5 * lobe.sharpness)))
+    simd.mul_f32s(square, simd.splat_f32s(-0.5 * lobe.sharpness))
 }
 
 #[inline(always)]

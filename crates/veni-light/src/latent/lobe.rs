@@ -15,6 +15,10 @@ pub struct Lobe {
 }
 
 impl Lobe {
+    /// What may change of a lobe, in this order: the amplitude (R, G, B), ln s, and the angle of the middle along the two
+    /// [tangents](Lobe::tangents). It is stored as seven numbers, since a unit vector has three.
+    pub const COORDINATES: usize = 6;
+
     /// What it adds to log radiance in a unit direction.
     pub fn value(&self, direction: [f32; 3]) -> [f32; 3] {
         let cosine: f32 = self.direction.iter().zip(direction).map(|(a, b)| a * b).sum();
@@ -27,6 +31,29 @@ impl Lobe {
     pub fn rotated(mut self, angle: f64) -> Self {
         let ((s, c), [x, y, z]) = (angle.sin_cos(), self.direction.map(f64::from));
         self.direction = [c * x - s * y, s * x + c * y, z].map(|v| v as f32);
+        self
+    }
+
+    /// Two unit vectors that are orthogonal to the direction and to each other, in the plane of which its middle moves: along the
+    /// horizon and upwards, so that they rotate with the lobe. At the poles, where neither is defined, along x and y.
+    pub fn tangents(&self) -> [[f32; 3]; 2] {
+        let [x, y, z] = self.direction.map(f64::from);
+        let radius = x.hypot(y);
+        let [c, s] = if radius > 1e-6 { [x / radius, y / radius] } else { [0.0, -1.0] };
+        [[-s, c, 0.0], [-z * c, -z * s, radius]].map(|v| normalised(v).map(|c| c as f32))
+    }
+
+    /// The lobe after a small change of its [coordinates](Lobe::COORDINATES); the middle stays on the sphere.
+    #[must_use]
+    pub fn moved(mut self, by: &[f64; Self::COORDINATES]) -> Self {
+        let [p, q] = self.tangents();
+        for (amplitude, by) in self.amplitude.iter_mut().zip(by) {
+            *amplitude = (f64::from(*amplitude) + by) as f32;
+        }
+        self.sharpness = (f64::from(self.sharpness) * by[3].exp()) as f32;
+        let along =
+            |k: usize| f64::from(self.direction[k]) + by[4] * f64::from(p[k]) + by[5] * f64::from(q[k]);
+        self.direction = normalised([0, 1, 2].map(along)).map(|c| c as f32);
         self
     }
 
@@ -70,4 +97,9 @@ impl Lobe {
         }
         Ok(())
     }
+}
+
+fn normalised(v: [f64; 3]) -> [f64; 3] {
+    let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    v.map(|c| c / length)
 }

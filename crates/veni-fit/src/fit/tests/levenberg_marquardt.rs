@@ -73,7 +73,7 @@ fn a_wrong_gradient_or_matrix_takes_it_nowhere() {
         let mut matrix = vec![0.0; 16];
         (0..9).for_each(|k| matrix[k / 3 * 4 + k % 3] = h[k / 3][k % 3]);
         let gradient = g.into_iter().map(|g| sign * g).chain([0.0]).collect();
-        QuadraticModel::new(NormalEquations { loss, gradient, matrix }, false)
+        QuadraticModel::new(NormalEquations { loss, gradient, matrix }, z.vectors.len(), false)
     };
     let start = Latent::new(vec![[1.0, -2.0, 3.0]]);
     let after = |sign: f64, steps: usize| {

@@ -2,6 +2,7 @@
 
 mod levenberg_marquardt;
 mod linear;
+mod lobes;
 
 use super::pixel::PixelValue;
 use super::*;

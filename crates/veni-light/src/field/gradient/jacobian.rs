@@ -3,6 +3,7 @@
 
 use pulp::Simd;
 
+use super::lobes::LobeRows;
 use super::pass::{BackwardVisitor, Pass};
 use crate::field::Folded;
 use crate::field::block::{Row, VECTORS, product};
@@ -69,6 +70,7 @@ impl<'a> Chain<'a> {
 /// The rows of the Jacobian of one colour, for a block.
 pub(super) struct Rows<'a, S: Simd> {
     chain: &'a Chain<'a>,
+    lobes: &'a [LobeRows],
     zeros: Vec<f32>,
     /// A row for each coordinate.
     jacobian: &'a mut [Row<S>],
@@ -77,22 +79,22 @@ pub(super) struct Rows<'a, S: Simd> {
 }
 
 impl<'a, S: Simd> Rows<'a, S> {
-    /// In `jacobian`, a row for each coordinate, and `polar`, [`Chain::padded`] rows.
+    /// In `jacobian`, a row for each coordinate, those of `lobes` after the exposure, and `polar`, [`Chain::padded`] rows.
     #[inline(always)]
     pub(super) fn new(
         simd: S,
         chain: &'a Chain<'a>,
+        lobes: &'a [LobeRows],
         jacobian: &'a mut [Row<S>],
         polar: &'a mut [Row<S>],
     ) -> Self {
-        // the last coordinate, the log exposure, adds to every log radiance alike
-        let last = jacobian.len() - 1;
-        jacobian[last] = [simd.splat_f32s(1.0); VECTORS];
-        Self { chain, zeros: vec![0.0; chain.padded()], jacobian, polar }
+        // the log exposure adds to every log radiance alike
+        jacobian[3 * chain.vectors.len()] = [simd.splat_f32s(1.0); VECTORS];
+        Self { chain, lobes, zeros: vec![0.0; chain.padded()], jacobian, polar }
     }
 
     /// ∂P_c/∂(latent) in the directions that went forward last, P_c their log radiance of colour `c`: a row for each
-    /// coordinate, the exposure last.
+    /// coordinate, then the exposure, then the lobes.
     #[inline(always)]
     pub(super) fn of_colour(&mut self, simd: S, pass: &mut Pass<'_, S>, c: usize) -> &[Row<S>] {
         let zero = simd.splat_f32s(0.0);
@@ -101,6 +103,8 @@ impl<'a, S: Simd> Rows<'a, S> {
         self.polar.as_flattened_mut().fill(zero);
         pass.backward(simd, self);
         self.finish(simd);
+        let first = 3 * self.chain.vectors.len() + 1;
+        LobeRows::fill(self.lobes, simd, pass.direction, c, &mut self.jacobian[first..]);
         self.jacobian
     }
 

@@ -109,7 +109,7 @@ impl WithSimd for Sum<'_> {
         let (jacobian, polar) = rest.split_at_mut(unknowns);
         let jacobian_sums = &mut jacobian_sums[..sums.jacobian.len()];
         jacobian_sums.fill(simd.splat_f32s(0.0));
-        let mut rows = Rows::new(simd, chain, jacobian, polar);
+        let mut rows = Rows::new(simd, chain, &[], jacobian, polar);
 
         for (directions, weights) in directions.chunks(lanes).zip(weights.chunks(lanes * count)) {
             pass.forward(simd, directions);

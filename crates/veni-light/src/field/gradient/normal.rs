@@ -9,6 +9,7 @@ use pulp::{Simd, WithSimd};
 
 use super::in_tasks;
 use super::jacobian::{Chain, Rows};
+use super::lobes::LobeRows;
 use super::operations::accumulate_product;
 use super::outer::{self, Wide};
 use super::pass::{Pass, flat, flat_mut, lane_sum};
@@ -16,6 +17,7 @@ use crate::field::aligned::Aligned;
 use crate::field::block::VECTORS;
 use crate::field::mlp::Mlp;
 use crate::field::{Field, Folded};
+use crate::latent::Lobe;
 
 /// Fewest directions of a task, and about how many tasks: each has a matrix of its own.
 const TASK: usize = 96;
@@ -33,7 +35,7 @@ pub struct LocalQuadratic {
 }
 
 /// Σᵢ ℓᵢ and its model ℓ + gᵀδ + ½ δᵀHδ for a small change δ of the latent: x, y, z of the N vectors one after the
-/// other, then the log exposure; 3N + 1 coordinates.
+/// other, then the log exposure, 3N + 1 coordinates; then, where they were asked for, [`Lobe::COORDINATES`] of each lobe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalEquations {
     /// Σᵢ ℓᵢ.
@@ -56,15 +58,37 @@ impl Field {
         directions: &[[f32; 3]],
         loss: impl Fn(usize, [f32; 3]) -> LocalQuadratic + Sync,
     ) -> NormalEquations {
+        self.equations(directions, &[], loss)
+    }
+
+    /// The same with the coordinates of the code's lobes as unknowns too: the change of each lobe, as
+    /// [`Lobe::moved`](crate::latent::Lobe::moved) takes it, follows the log exposure.
+    ///
+    /// Costs 3 (3N + 1 + 6K)² multiply-adds more a direction.
+    pub fn normal_equations_with_lobes(
+        &self,
+        directions: &[[f32; 3]],
+        loss: impl Fn(usize, [f32; 3]) -> LocalQuadratic + Sync,
+    ) -> NormalEquations {
+        self.equations(directions, &LobeRows::of(&self.folded.lobes), loss)
+    }
+
+    fn equations(
+        &self,
+        directions: &[[f32; 3]],
+        lobes: &[LobeRows],
+        loss: impl Fn(usize, [f32; 3]) -> LocalQuadratic + Sync,
+    ) -> NormalEquations {
         let (weights, folded) = (&*self.weights, &*self.folded);
         let chain = Chain::new(weights, folded);
-        let unknowns = 3 * weights.latent_vectors + 1;
+        let unknowns = 3 * weights.latent_vectors + 1 + Lobe::COORDINATES * lobes.len();
         let parts = in_tasks(directions, TASK, TASKS, |scratch, first, directions| {
             let mut sums = NormalEquations::zero(unknowns);
             pulp::Arch::new().dispatch(Normal {
                 mlp: &weights.mlp,
                 folded,
                 chain: &chain,
+                lobes,
                 directions,
                 loss: &|i, p| loss(first + i, p),
                 sums: &mut sums,
@@ -100,6 +124,7 @@ struct Normal<'a> {
     mlp: &'a Mlp,
     folded: &'a Folded,
     chain: &'a Chain<'a>,
+    lobes: &'a [LobeRows],
     directions: &'a [[f32; 3]],
     loss: &'a QuadraticLoss<'a>,
     sums: &'a mut NormalEquations,
@@ -111,7 +136,7 @@ impl WithSimd for Normal<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { mlp, folded, chain, directions, loss, sums, scratch } = self;
+        let Self { mlp, folded, chain, lobes, directions, loss, sums, scratch } = self;
         let (lanes, unknowns) = (outer::lanes::<S>(), sums.gradient.len());
         let panels = outer::panels::<S>(unknowns);
         let wide = size_of::<Wide<S>>() / size_of::<S::f32s>();
@@ -130,7 +155,7 @@ impl WithSimd for Normal<'_> {
         let (matrix, workspace) = workspace.split_at_mut(wide * panels * unknowns);
         let (transposed, matrix) = (transposed.as_chunks_mut().0, matrix.as_chunks_mut().0);
         let gradient = &mut workspace[..unknowns];
-        let mut rows = Rows::new(simd, chain, jacobian, polar);
+        let mut rows = Rows::new(simd, chain, lobes, jacobian, polar);
 
         for (b, directions) in directions.chunks(lanes).enumerate() {
             pass.forward(simd, directions);

@@ -69,7 +69,8 @@ pub(super) struct Pass<'a, S: Simd> {
     folded: &'a Folded,
     /// Features of every chunk of directional inputs, filled up to whole panels.
     features: Vec<usize>,
-    direction: &'a mut [Row<S>],
+    /// The block's directions: rows x, y, z.
+    pub(super) direction: &'a mut [Row<S>],
     /// Log radiance without the exposure, after [`Pass::forward`].
     pub(super) rgb: &'a mut [Row<S>],
     /// The gradient with respect to log radiance, for [`Pass::backward`]; its rows beyond the third are 0.

@@ -3,7 +3,7 @@
 use super::reference::Plain;
 use super::*;
 use crate::field::{LocalQuadratic, NormalEquations};
-use crate::latent::{Latent, Prior};
+use crate::latent::{Latent, Lobe, Prior};
 
 /// Σ w (p − t)² with weights and targets of every channel its own; every third direction counts nothing.
 fn loss(i: usize, p: [f32; 3]) -> LocalQuadratic {
@@ -129,4 +129,90 @@ fn the_number_of_threads_changes_no_bit_and_nothing_gives_zero() {
     assert_eq!(with(1), with(3));
     let none = found(&model, &at(3), &[]);
     assert!(none.loss == 0.0 && none.matrix.iter().chain(&none.gradient).all(|v| *v == 0.0));
+}
+
+/// Three lobes of different widths, with amplitudes of either sign.
+fn lobes() -> Vec<Lobe> {
+    let lobe = |direction: [f32; 3], amplitude, sharpness| {
+        let length = direction.iter().map(|c| c * c).sum::<f32>().sqrt();
+        Lobe { direction: direction.map(|c| c / length), amplitude, sharpness }
+    };
+    vec![
+        lobe([0.3, 0.2, 0.9], [1.5, 1.0, -0.5], 3.0),
+        lobe([-0.7, 0.7, -0.1], [-0.4, 0.2, 0.9], 20.0),
+        lobe([0.0, 0.0, -1.0], [1.0, 2.0, 0.0], 1.0),
+    ]
+}
+
+/// The rows of the lobes by central differences of their closed form in f64.
+fn lobe_rows(lobes: &[Lobe], d: [f32; 3]) -> Vec<[f64; 3]> {
+    let value = |lobe: &Lobe, by: [f64; Lobe::COORDINATES]| -> [f64; 3] {
+        let ([p, q], u) = (lobe.tangents().map(|t| t.map(f64::from)), lobe.direction.map(f64::from));
+        let moved = [0, 1, 2].map(|k| u[k] + by[4] * p[k] + by[5] * q[k]);
+        let length = moved.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let cosine: f64 = moved.iter().zip(d).map(|(a, b)| a / length * f64::from(b)).sum();
+        let gauss = (f64::from(lobe.sharpness) * by[3].exp() * (cosine - 1.0)).exp();
+        [0, 1, 2].map(|c| (f64::from(lobe.amplitude[c]) + by[c]) * gauss)
+    };
+    let row = |lobe: &Lobe, k: usize| {
+        let at = |step: f64| value(lobe, std::array::from_fn(|j| if j == k { step } else { 0.0 }));
+        let (high, low) = (at(1e-5), at(-1e-5));
+        [0, 1, 2].map(|c| (high[c] - low[c]) / 2e-5)
+    };
+    lobes.iter().flat_map(|lobe| (0..Lobe::COORDINATES).map(move |k| row(lobe, k))).collect()
+}
+
+#[test]
+fn lobes_are_unknowns_too() {
+    let (n, directions) = (3, directions(131));
+    let (model, latent) = (odd(n, 16, VnReluForm::Projection), Latent { lobes: lobes(), ..at(3) });
+    let field = model.decoder().unwrap().condition(&latent).unwrap();
+    // each direction alone, so that the matrix is that of its own rows; without the vectors, whose rows have a test above
+    let first = 3 * n + 1;
+    for d in &directions {
+        let found = field.normal_equations_with_lobes(&[*d], loss);
+        let unknowns = found.gradient.len();
+        assert_eq!(unknowns, first + Lobe::COORDINATES * latent.lobes.len());
+        let local = loss(0, field.log_radiance(*d));
+        let rows = lobe_rows(&latent.lobes, *d);
+        let gradient: Vec<f64> =
+            rows.iter().map(|row| (0..3).map(|c| row[c] * f64::from(local.gradient[c])).sum()).collect();
+        assert!(apart(&found.gradient[first..], &gradient) < 1e-4, "{d:?}");
+        let weight = local.weight.map(f64::from);
+        let product = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|c| weight[c] * a[c] * b[c]).sum::<f64>();
+        let expected: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(move |b| product(a, b))).collect();
+        let matrix: Vec<f64> =
+            found.matrix.chunks_exact(unknowns).skip(first).flat_map(|row| &row[first..]).copied().collect();
+        assert!(apart(&matrix, &expected) < 1e-4, "{d:?}");
+        // and a lobe that is moved is not the one that stays
+        let mut other = rows;
+        other[0][0] += 0.1;
+        let wrong: Vec<f64> = other.iter().flat_map(|a| other.iter().map(move |b| product(a, b))).collect();
+        assert!(apart(&matrix, &wrong) > 1e-4);
+    }
+    // beside the lobes everything is as without them
+    let [with, without] =
+        [field.normal_equations_with_lobes(&directions, loss), field.normal_equations(&directions, loss)];
+    let unknowns = with.gradient.len();
+    let part: Vec<f64> =
+        with.matrix.chunks_exact(unknowns).take(first).flat_map(|row| &row[..first]).copied().collect();
+    assert!(apart(&part, &without.matrix) < 1e-5 && apart(&with.gradient[..first], &without.gradient) < 1e-5);
+}
+
+#[test]
+fn a_moved_lobe_stays_on_the_sphere_and_rotates_with_its_tangents() {
+    for lobe in lobes() {
+        let by = [0.1, -0.2, 0.3, 0.4, 0.05, -0.1];
+        let moved = lobe.moved(&by);
+        let length = |v: [f32; 3]| v.iter().map(|c| c * c).sum::<f32>().sqrt();
+        assert!((length(moved.direction) - 1.0).abs() < 1e-6);
+        assert!((moved.sharpness / lobe.sharpness - 0.4f32.exp()).abs() < 1e-5);
+        let angle = moved.direction.iter().zip(lobe.direction).map(|(a, b)| a * b).sum::<f32>().acos();
+        assert!((angle - (0.05f32.hypot(0.1)).atan()).abs() < 1e-3, "{angle}");
+        if lobe.direction[2].abs() < 0.99 {
+            let (one, two) = (lobe.rotated(0.7).moved(&by), moved.rotated(0.7));
+            let apart = one.direction.iter().zip(two.direction).map(|(a, b)| (a - b).abs());
+            assert!(apart.fold(0.0, f32::max) < 1e-6, "{one:?} {two:?}");
+        }
+    }
 }
