@@ -202,7 +202,7 @@ fn every_input_comes_through_a_pipe() {
         [&["fit", "ball.exr", "--normals", "normals.exr", "--albedo-map", "ball.exr"], &fit[..]].concat();
     let cases: [(Vec<&str>, &str); 8] = [
         (vec!["light", "sky.exr", "-o", "out.json", "-f"], "sky.exr"),
-        ([&["fit", "ball.exr", "--mask", "mask.png"], &fit[..]].concat(), "mask.png"),
+        ([&["fit", "ball.exr", "--fov", "60", "--mask", "mask.png"], &fit[..]].concat(), "mask.png"),
         (ball.clone(), "normals.exr"),
         (ball, "mask.png"),
         (albedo, "normals.exr"),
