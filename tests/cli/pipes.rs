@@ -186,3 +186,167 @@ fn meshes_in_other_words_and_far_away_are_the_same() {
         assert!((moved - distance).abs() < 1e-6, "{name}: the camera is where the file says: {moved}");
     }
 }
+
+/// Whatever names a file takes `-`, and says the same as with a file.
+#[test]
+fn every_input_comes_through_a_pipe() {
+    let dir = Dir::new();
+    let (exr, _) = sky(&dir);
+    dir.ok(&["light", "sky.exr", "-o", "light.json", "-q"]);
+    let probe = ["render-probe", "sky.exr", "-o", "ball.exr", "--size", "24", "-q"];
+    dir.ok(&[&probe[..], &["--normals", "normals.exr", "--mask", "mask.png"]].concat());
+    dir.write("cube.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n");
+    let fit = ["--steps", "2", "--resolution", "16", "--starts", "1", "-q", "-o", "out.json", "-f"];
+    let ball = [&["fit", "ball.exr", "--normals", "normals.exr", "--mask", "mask.png"], &fit[..]].concat();
+    let albedo =
+        [&["fit", "ball.exr", "--normals", "normals.exr", "--albedo-map", "ball.exr"], &fit[..]].concat();
+    let cases: [(Vec<&str>, &str); 8] = [
+        (vec!["light", "sky.exr", "-o", "out.json", "-f"], "sky.exr"),
+        ([&["fit", "ball.exr", "--fov", "60", "--mask", "mask.png"], &fit[..]].concat(), "mask.png"),
+        (ball.clone(), "normals.exr"),
+        (ball, "mask.png"),
+        (albedo, "normals.exr"),
+        (
+            vec!["fit", "--target-sh", "light.json", "--steps", "2", "-q", "-o", "out.json", "-f"],
+            "light.json",
+        ),
+        (
+            vec!["fit", "--target-irradiance", "light.json", "--steps", "2", "-q", "-o", "out.json", "-f"],
+            "light.json",
+        ),
+        (
+            vec![
+                "render-probe",
+                "sky.exr",
+                "--mesh",
+                "cube.obj",
+                "--size",
+                "24",
+                "-o",
+                "out.exr",
+                "-f",
+                "-q",
+            ],
+            "cube.obj",
+        ),
+    ];
+    for (args, name) in cases {
+        let out = if args.contains(&"out.exr") { "out.exr" } else { "out.json" };
+        dir.ok(&args);
+        let expected = std::fs::read(dir.path(out)).unwrap();
+        let dashed: Vec<_> = args.iter().map(|arg| if *arg == name { "-" } else { *arg }).collect();
+        let (code, _, err) = piped(&dir, &dashed, &std::fs::read(dir.path(name)).unwrap());
+        assert_eq!(code, Some(0), "{args:?}: {err}");
+        // a latent says what it was found in
+        let same = |bytes: &[u8]| String::from_utf8_lossy(bytes).replace("\"stdin\"", &format!("\"{name}\""));
+        assert_eq!(same(&std::fs::read(dir.path(out)).unwrap()), same(&expected), "{args:?}");
+    }
+    let (code, _, err) =
+        piped(&dir, &["ibl", "-", "--engine", "gltf", "-o", "ibl", "--size", "16", "-q"], &exr);
+    assert!(code == Some(0) && dir.path("ibl").is_dir(), "{err}");
+}
+
+#[test]
+fn every_output_goes_to_standard_output() {
+    let dir = Dir::new();
+    sky(&dir);
+    let fit =
+        ["fit", "sky.exr", "--steps", "2", "--resolution", "16", "--starts", "2", "-q", "-f", "-o", "a.json"];
+    let probe = ["render-probe", "sky.exr", "-o", "ball.exr", "--size", "24", "-q", "-f"];
+    let light = ["light", "--seed", "19", "--size", "64", "-q", "-f"];
+    for (args, option, name) in [
+        (&["encode", "sky.exr", "-q", "-f", "-o", "a.json"][..], "--preview", "out.png"),
+        (&fit, "--completed", "out.exr"),
+        (&fit, "--uncertainty", "out.exr"),
+        (&probe, "--normals", "out.exr"),
+        (&probe, "--mask", "out.png"),
+        (&light, "--residual", "out.exr"),
+        (&light, "--sharpened", "out.exr"),
+        (&light, "-o", "out.json"),
+        (&["synth", "-n", "2", "--size", "32", "-q", "-f"], "--sheet", "out.png"),
+    ] {
+        dir.ok(&[args, &[option, name]].concat());
+        let (code, out, err) = piped(&dir, &[args, &[option, "-"]].concat(), b"");
+        assert_eq!(code, Some(0), "{args:?}: {err}");
+        assert!(out == std::fs::read(dir.path(name)).unwrap(), "{args:?} {option}");
+    }
+    assert!(!dir.path("-").exists());
+}
+
+/// One option each takes standard input and output; what is a folder, or is to be found again by its name, never does.
+#[test]
+fn dashes_that_cannot_be_are_one_clear_error() {
+    let dir = Dir::new();
+    sky(&dir);
+    for (args, words) in [
+        (&["fit", "-", "--mask", "-"][..], ["PICTURE and --mask", "read only once"]),
+        (&["bake", "-", "--model", "-", "-o", "a.exr"], ["LATENT and --model", "read only once"]),
+        (&["encode", "-", "-", "--out-dir", "o"], ["PANORAMA names - twice", "read only once"]),
+        (&["render-probe", "sky.exr", "-o", "-", "--mask", "-"], ["--output and --mask", "name files"]),
+        (&["fit", "sky.exr", "-o", "-", "--completed", "-"], ["--output and --completed", "name files"]),
+        (&["fit", "sky.exr", "--completed", "-"], ["standard output too", "-o"]),
+        (&["encode", "sky.exr", "--preview", "-"], ["standard output too", "-o"]),
+        (&["bake", "--seed", "1", "--out-dir", "-"], ["--out-dir -", "./-"]),
+        (&["sample", "-o", "a.png", "--latents", "-"], ["--latents -", "./-"]),
+        (&["synth", "-o", "-"], ["--output -", "./-"]),
+        (&["day", "--place", "48,11", "--date", "2026-06-21", "-o", "-"], ["--output -", "./-"]),
+        (&["ibl", "sky.exr", "--engine", "gltf", "-o", "-"], ["--output -", "./-"]),
+        (&["prepare", "-", "-o", "set"], ["INPUT -", "./-"]),
+        (&["prepare", ".", "-o", "set", "--expand-with", "-"], ["--expand-with -", "./-"]),
+        (&["man", "-"], ["DIR -", "./-"]),
+    ] {
+        dir.refused(args, &words);
+    }
+    // a second name of standard input
+    #[cfg(target_os = "linux")]
+    {
+        let exr = std::fs::read(dir.path("sky.exr")).unwrap();
+        let (code, _, err) = piped(&dir, &["fit", "-", "--mask", "/dev/stdin", "-o", "a.json", "-q"], &exr);
+        assert!(code == Some(2) && err.contains("read only once"), "{err}");
+    }
+}
+
+/// A process that is killed outright cannot remove the copy of what came in; the next one does.
+#[cfg(unix)]
+#[test]
+fn what_a_killed_process_kept_of_a_pipe_is_swept_by_the_next() {
+    use std::io::Write as _;
+    let dir = Dir::new();
+    sky(&dir);
+    let temporary = dir.path("tmp");
+    std::fs::create_dir(&temporary).unwrap();
+    let kept = || std::fs::read_dir(&temporary).unwrap().count();
+    let begin = || {
+        let mut command = dir.command(&["encode", "-", "-q"]);
+        let command = command.env("TMPDIR", &temporary).stdin(Stdio::piped()).stdout(Stdio::null());
+        let mut child = command.spawn().unwrap();
+        // more is to come
+        child.stdin.as_mut().unwrap().write_all(b"#?RADIANCE\n").unwrap();
+        child
+    };
+    let mut killed = begin();
+    while kept() == 0 {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    assert_eq!(kept(), 1);
+    let bake = ["bake", "--seed", "1", "--size", "16", "-q", "-o", "next.exr"];
+    let mut next = dir.command(&bake);
+    assert_eq!(crate::util::finish(next.env("TMPDIR", &temporary)).code, Some(0));
+    assert_eq!(kept(), 0);
+    // one that is alive keeps its own
+    let mut alive = begin();
+    while kept() == 0 {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    // its lock comes a moment after its folder
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let mut next = dir.command(&[&bake[..], &["-f"]].concat());
+    assert_eq!(crate::util::finish(next.env("TMPDIR", &temporary)).code, Some(0));
+    assert_eq!(kept(), 1);
+    // and removes it when it is asked to end
+    assert!(std::process::Command::new("kill").arg(alive.id().to_string()).status().unwrap().success());
+    alive.wait().unwrap();
+    assert_eq!(kept(), 0);
+}

@@ -1,11 +1,12 @@
 //! The command line as a whole: everything that can be typed, and what runs it.
 
 use anyhow::Result;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::commands;
 use crate::features::{GPU, LEARN, only};
 use crate::report::{Outcome, Report};
+use crate::standard;
 
 /// Everything that can be typed.
 #[derive(Debug, Parser)]
@@ -20,7 +21,8 @@ use crate::report::{Outcome, Report};
         only(GPU, "on the graphics card if there is one, "),
         only(LEARN, "trains models, ")),
     after_help = format!("Results are printed on stdout, everything else on stderr.\n\
-        Exit codes: 0 fine; 1 ran, but stopped early or the answer is no; 2 error.\n\n\
+        Exit codes: 0 fine; 1 ran, but stopped early or the answer is no; 2 error.\n\
+        - in place of a file is standard input or output.\n\n\
         Examples:\n  \
         veni-cli bake --seed 7 -o sky.exr             a random sky\n  \
         veni-cli sample -o sheet.png                  sixteen random skies on one sheet\n  \
@@ -41,6 +43,17 @@ pub(crate) struct Cli {
     /// Print results and errors only: no progress, no notes
     #[arg(long, short, global = true, display_order = 901)]
     pub(crate) quiet: bool,
+}
+
+impl Cli {
+    /// What was typed, and whether a file goes to standard output; that `-` stands where it cannot is an error of the command.
+    pub(crate) fn typed() -> Result<(Self, Result<bool>), clap::Error> {
+        let mut command = Self::command();
+        let mut typed = command.try_get_matches_from_mut(std::env::args_os())?;
+        let is_taken = standard::check(&command, &typed);
+        let cli = Self::from_arg_matches_mut(&mut typed).map_err(|error| error.format(&mut command))?;
+        Ok((cli, is_taken))
+    }
 }
 
 /// The commands, in the order of `--help`.
@@ -115,6 +128,16 @@ mod tests {
             for argument in command.get_arguments() {
                 assert!(argument.get_help().is_some(), "{name}: {} is not explained", argument.get_id());
             }
+        }
+    }
+    #[test]
+    fn what_may_be_a_dash_is_an_argument() {
+        let mut cli = Cli::command();
+        cli.build();
+        let rows = standard::MAY.iter().filter(|(of, ..)| *of != "evaluate" || cfg!(feature = "learn"));
+        for (of, id, _) in rows {
+            let mut commands = cli.get_subcommands().filter(|c| *of == "*" || c.get_name() == *of);
+            assert!(commands.any(|c| c.get_arguments().any(|a| a.get_id() == *id)), "{of}: {id}");
         }
     }
 }

@@ -8,6 +8,7 @@ use veni_light::output::Overwrite;
 
 use crate::output::{check, check_distinct, create_folder, named, refuse_existing};
 use crate::piped;
+use crate::report::Report;
 use crate::shard::Shard;
 
 /// What latent files are called.
@@ -28,12 +29,21 @@ pub(crate) struct LatentFiles {
 impl LatentFiles {
     /// The file for each of `inputs`, or none at all if the latents go to stdout. Those of this process's share are
     /// checked before any work; the names of all of them must differ.
-    pub(crate) fn of(&self, inputs: &[PathBuf], overwrite: Overwrite, shard: Shard) -> Result<Vec<PathBuf>> {
+    pub(crate) fn of(
+        &self,
+        inputs: &[PathBuf],
+        overwrite: Overwrite,
+        shard: Shard,
+        report: Report,
+    ) -> Result<Vec<PathBuf>> {
+        if report.is_beside_stdout() && self.output.is_none() && self.out_dir.is_none() {
+            bail!("-: the latents go to standard output too; name files for them with -o or --out-dir");
+        }
         let names = match (&self.output, &self.out_dir) {
             (Some(_), _) if inputs.len() > 1 => {
                 bail!("-o names one file for {} inputs: name a folder with --out-dir DIR", inputs.len())
             }
-            (Some(output), _) if piped::is_stdout(output) => return Ok(Vec::new()),
+            (Some(output), _) if piped::is_standard(output) => return Ok(Vec::new()),
             (Some(output), _) => vec![output.clone()],
             (None, None) => return Ok(Vec::new()),
             (None, Some(folder)) => {

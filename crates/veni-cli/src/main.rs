@@ -24,24 +24,30 @@ mod part;
 mod picture;
 mod piped;
 mod printable;
+mod private;
 mod progress;
 mod report;
 mod shard;
 mod size;
 mod skies;
 mod source;
+mod standard;
 
 use std::process::ExitCode;
-
-use clap::Parser;
 
 use crate::report::{Outcome, Report};
 
 fn main() -> ExitCode {
-    let cli = cli::Cli::try_parse().unwrap_or_else(|error| report::exit_on_usage(&error));
+    let (cli, is_taken) = cli::Cli::typed().unwrap_or_else(|error| report::exit_on_usage(&error));
     interrupt::watch();
+    private::sweep();
     let report = Report::new(cli.json, cli.quiet);
-    let result = cli.command.run(report);
+    let result = is_taken.and_then(|is_taken| {
+        let result = cli.command.run(if is_taken { report.beside_stdout() } else { report });
+        // what is there was finished: of several inputs others may have failed, as with a file
+        let delivered = piped::deliver(report::to_stdout);
+        result.and_then(|outcome| delivered.map(|()| outcome))
+    });
     let code = end(result);
     piped::clear();
     code

@@ -34,6 +34,10 @@ pub(crate) fn check(paths: &[PathBuf], extensions: &[&str], overwrite: Overwrite
     check_distinct(paths)?;
     let mut probed = HashSet::new();
     for path in paths {
+        if path.as_os_str().as_encoded_bytes().last().is_some_and(|b| std::path::is_separator(char::from(*b)))
+        {
+            bail!("{}: ends as a folder's name does; name a file", path.display());
+        }
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         if !extension.as_deref().is_some_and(|e| extensions.contains(&e)) {
             bail!("{}: the name must end in .{}", path.display(), extensions.join(" or ."));
@@ -77,9 +81,17 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 /// Refuses two outputs of one name.
 pub(crate) fn check_distinct(paths: &[PathBuf]) -> Result<()> {
     let mut known = HashSet::new();
-    match paths.iter().find(|path| !known.insert(*path)) {
+    match paths.iter().find(|path| !known.insert(place(path))) {
         Some(path) => bail!("{}: would be written twice; leave one out or rename it", path.display()),
         None => Ok(()),
+    }
+}
+
+/// Where a name leads, whichever way it is written.
+fn place(path: &Path) -> PathBuf {
+    match (path.file_name(), folder_of(path).canonicalize()) {
+        (Some(name), Ok(folder)) => folder.join(name),
+        _ => path.to_path_buf(),
     }
 }
 
@@ -206,6 +218,20 @@ mod tests {
         for (path, _) in &files {
             assert_eq!(Panorama::read(path).unwrap().pixels(), image.pixels());
         }
+    }
+
+    #[test]
+    fn one_place_is_not_written_twice() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("sub")).unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for other in ["a.exr", "./a.exr", "sub/../a.exr"] {
+            let message = check_distinct(&[at("a.exr"), at(other)]).unwrap_err().to_string();
+            assert!(message.contains("written twice"), "{message}");
+        }
+        check_distinct(&[at("a.exr"), at("sub/a.exr"), at("no/a.exr"), at("no/b.exr")]).unwrap();
+        let message = check(&[at("a.exr/")], &["exr"], Overwrite::Refuse).unwrap_err().to_string();
+        assert!(message.contains("a.exr/: ends as a folder"), "{message}");
     }
 
     #[test]

@@ -36,6 +36,11 @@ impl Report {
         Self { taken: true, ..self }
     }
 
+    /// Whether an output file goes to stdout.
+    pub(crate) fn is_beside_stdout(self) -> bool {
+        self.taken
+    }
+
     /// Whether results are to be JSON.
     pub(crate) fn is_json(self) -> bool {
         self.json

@@ -10,7 +10,7 @@ use veni_light::output::Overwrite;
 use crate::numbers::{finite, stops};
 use crate::output;
 use crate::piped;
-use crate::report::{Report, to_stdout};
+use crate::report::Report;
 use crate::shard::Shard;
 
 /// Extensions that can be written.
@@ -96,19 +96,6 @@ impl Format {
 pub(crate) struct Job {
     pub(crate) sky: Sky,
     pub(crate) files: Vec<PathBuf>,
-    /// What is written to standard output instead of files.
-    stdout: Option<Format>,
-}
-
-impl Job {
-    /// Does `work`; what it would write to `-` goes to standard output, and its results then to stderr.
-    pub(crate) fn run(self, report: Report, work: impl FnOnce(&Self, Report) -> Result<()>) -> Result<()> {
-        let Some(format) = self.stdout else { return work(&self, report) };
-        let bytes = piped::output(format.extension(), |path| {
-            work(&Self { files: vec![path.to_path_buf()], ..self }, report.beside_stdout())
-        })?;
-        to_stdout(&bytes)
-    }
 }
 
 /// What a sky is named by.
@@ -144,19 +131,18 @@ pub(crate) fn jobs(
     many.shard.note_idle(skies.len(), report);
     let formats = if many.format.is_empty() { &[Format::Exr] } else { many.format.as_slice() };
     let Some(folder) = &target.out_dir else {
-        let to_stdout = target.output.iter().any(|file| piped::is_stdout(file));
+        let to_stdout = target.output.iter().any(|file| piped::is_standard(file));
         if !to_stdout && !many.format.is_empty() {
             bail!("--format is for --out-dir and for -o -: the names of other images say their format");
         }
         if skies.len() > 1 {
             bail!("-o names the images of one sky, not of {}: name a folder with --out-dir DIR", skies.len());
         }
-        let stdout = to_stdout.then(|| standard(&target.output, formats)).transpose()?;
-        let files = if to_stdout { Vec::new() } else { target.output.clone() };
-        let jobs = skies.into_iter().map(|sky| Job { sky, files: files.clone(), stdout });
+        let files = if to_stdout { vec![standard(&target.output, formats)?] } else { target.output.clone() };
+        let jobs = skies.into_iter().map(|sky| Job { sky, files: files.clone() });
         let jobs = many.shard.own(&jobs.collect::<Vec<_>>());
-        if !jobs.is_empty() && !to_stdout {
-            output::check(&target.output, &EXTENSIONS, overwrite)?;
+        if !jobs.is_empty() {
+            output::check(&files, &EXTENSIONS, overwrite)?;
         }
         return with_inputs(jobs);
     };
@@ -170,13 +156,12 @@ pub(crate) fn jobs(
     with_inputs(jobs)
 }
 
-/// What goes to standard output, the only output.
-fn standard(outputs: &[PathBuf], formats: &[Format]) -> Result<Format> {
-    let ([_], [format]) = (outputs, formats) else {
+/// What goes to standard output, the only image of the sky.
+fn standard(outputs: &[PathBuf], formats: &[Format]) -> Result<PathBuf> {
+    let ([output], [format]) = (outputs, formats) else {
         bail!("-o -: standard output takes one image in one format; name files for others");
     };
-    piped::check_stdout()?;
-    Ok(*format)
+    piped::output(output, format.extension())
 }
 
 /// Jobs whose skies are in files that can be read as often as needed.
@@ -203,7 +188,7 @@ fn job(sky: Sky, folder: &Path, formats: &[Format]) -> Result<Job> {
         Sky::Seed(seed) => PathBuf::from(format!("seed-{seed}")),
     };
     let files = formats.iter().map(|f| output::named(folder, &name, f.extension())).collect::<Result<_>>()?;
-    Ok(Job { sky, files, stdout: None })
+    Ok(Job { sky, files })
 }
 
 fn count(text: &str) -> Result<u64, String> {

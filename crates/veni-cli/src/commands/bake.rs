@@ -55,7 +55,7 @@ const DEVICES: &str = "Devices: a graphics card bakes the same picture as the CP
         only(GPU, "\n  veni-cli bake --seed 7 -o sky.exr --device cpu         the same bits whatever card there is"))
 )]
 pub(crate) struct Bake {
-    /// Latent files, baked images, or HDR panoramas
+    /// Latent files, baked images, or HDR panoramas; - is standard input
     #[arg(group = "sky", value_name = "LATENT")]
     latents: Vec<PathBuf>,
 
@@ -114,7 +114,7 @@ impl Bake {
             loaded,
             device,
         };
-        report::each(jobs, |job| job.run(report, |job, report| self.one(job, &baking, report)))
+        report::each(jobs, |job| self.one(&job, &baking, report))
     }
 
     /// One sky to its files.

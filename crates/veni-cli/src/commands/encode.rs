@@ -53,7 +53,7 @@ pub(crate) struct Encode {
     #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8))]
     compact_lights: Option<u8>,
 
-    /// Also write a PNG: panorama | reconstruction, one pair per row
+    /// Also write a PNG: panorama | reconstruction, one pair per row; - is standard output
     #[arg(long, value_name = "OUT.png")]
     preview: Option<PathBuf>,
 
@@ -71,9 +71,10 @@ pub(crate) struct Encode {
 }
 
 impl Encode {
-    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+    pub(crate) fn run(mut self, report: Report) -> Result<Outcome> {
+        self.preview = piped::output_if(self.preview.as_deref(), "png")?;
         let overwrite = Overwrite::from(self.force);
-        let outputs = self.outputs(overwrite)?;
+        let outputs = self.outputs(overwrite, report)?;
         let loaded = source::model(&self.model)?;
         let encoding = Encoding::new(&loaded, self.compact_lights.map(usize::from))?;
         let mut sheet =
@@ -114,12 +115,12 @@ impl Encode {
     }
 
     /// One latent file per panorama, checked; none if the latents go to stdout.
-    fn outputs(&self, overwrite: Overwrite) -> Result<Vec<PathBuf>> {
+    fn outputs(&self, overwrite: Overwrite, report: Report) -> Result<Vec<PathBuf>> {
         self.shard.refuse("--preview", self.preview.is_some())?;
         if let Some(preview) = &self.preview {
             output::check(std::slice::from_ref(preview), &["png"], overwrite)?;
         }
-        self.target.of(&self.panoramas, overwrite, self.shard)
+        self.target.of(&self.panoramas, overwrite, self.shard, report)
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod band_sun;
 mod completed;
+mod images;
 mod input;
 mod integrals;
 mod lit;
@@ -23,15 +24,15 @@ use veni_light::output::Overwrite;
 
 use crate::args::{Force, ModelArgs};
 use crate::latent_files::{LatentFiles, source_of};
-use crate::output::{self, with_remedy};
+use crate::output::with_remedy;
 use crate::piped;
 use crate::printable::printable_json;
 use crate::progress::ProgressBars;
 use crate::report::{self, Outcome, Report, lines_to_stdout};
 use crate::shard::Shard;
-use crate::size::Size;
 use crate::source;
 
+use images::ImageArgs;
 pub(crate) use input::Input;
 use integrals::Integrals;
 use lit::{Lit, LitArgs, Seen};
@@ -73,22 +74,11 @@ pub(crate) struct Fit {
     #[command(flatten)]
     target: LatentFiles,
 
-    /// Also write the whole panorama: what is known as it is, the rest from the latent (.exr, .hdr, .png; one
-    /// picture)
-    #[arg(long, value_name = "OUT")]
-    completed: Option<PathBuf>,
-
-    /// Also write an uncertainty map, how much the starts disagree: standard deviation of log radiance (.exr, or .png
-    /// as a heat map up to one stop)
-    #[arg(long, value_name = "OUT")]
-    uncertainty: Option<PathBuf>,
+    #[command(flatten)]
+    images: ImageArgs,
 
     #[command(flatten)]
     lit: LitArgs,
-
-    /// Size of the images of --completed and --uncertainty [default: that of a panorama, 1024x512 for a photograph]
-    #[arg(long, value_name = "W|WxH")]
-    size: Option<Size>,
 
     #[command(flatten)]
     settings: Settings,
@@ -120,14 +110,22 @@ pub(crate) struct Fitted {
 }
 
 impl Fit {
-    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+    pub(crate) fn run(mut self, report: Report) -> Result<Outcome> {
         let overwrite = Overwrite::from(self.force);
-        let pictures = &self.input.pictures;
-        self.check_images(overwrite)?;
-        if pictures.is_empty() {
+        self.images.check(self.input.pictures.len(), self.shard, overwrite)?;
+        let is_seen = !self.input.pictures.is_empty() && self.rendered.normals.is_none();
+        if self.images.completed.is_some() && self.integrals.scales() && is_seen {
+            bail!(
+                "--illuminance gives the latent another unit than the picture's: leave --completed out, and bake the latent"
+            );
+        }
+        if self.input.pictures.is_empty() {
             return self.unseen(overwrite, report);
         }
-        let outputs = self.target.of(pictures, overwrite, self.shard)?;
+        let outputs = self.target.of(&self.input.pictures, overwrite, self.shard, report)?;
+        self.input.keep()?;
+        self.rendered.keep()?;
+        let pictures = &self.input.pictures;
         self.shard.note_idle(pictures.len(), report);
         self.settings.grid(false)?;
         let config = self.settings.config(self.rendered.normals.is_some())?;
@@ -135,36 +133,6 @@ impl Fit {
         report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
             self.one(&piped::input(path)?, outputs.get(at), &model, &config, report)
         })
-    }
-
-    /// Refuses what could not be written after the fits.
-    fn check_images(&self, overwrite: Overwrite) -> Result<()> {
-        if let Some(size) = self.size {
-            size.equirect()?;
-        }
-        let images = [(&self.completed, "--completed"), (&self.uncertainty, "--uncertainty")];
-        for (path, option) in images {
-            self.shard.refuse(option, path.is_some())?;
-            if path.is_some() && self.input.pictures.len() > 1 {
-                bail!(
-                    "{option} names one file for {} pictures: fit them one by one",
-                    self.input.pictures.len()
-                );
-            }
-        }
-        let is_seen = !self.input.pictures.is_empty() && self.rendered.normals.is_none();
-        if self.completed.is_some() && self.integrals.scales() && is_seen {
-            bail!(
-                "--illuminance gives the latent another unit than the picture's: leave --completed out, and bake the latent"
-            );
-        }
-        let named = |path: &Option<PathBuf>, extensions: &[&str]| {
-            path.iter().try_for_each(|p| output::check(std::slice::from_ref(p), extensions, overwrite))
-        };
-        named(&self.completed, &["exr", "hdr", "png"])?;
-        named(&self.uncertainty, &["exr", "png"])?;
-        let both: Vec<_> = [&self.completed, &self.uncertainty].into_iter().flatten().cloned().collect();
-        output::check_distinct(&both)
     }
 
     fn one(
@@ -208,7 +176,7 @@ impl Fit {
     fn unseen(&self, overwrite: Overwrite, report: Report) -> Result<Outcome> {
         let name = self.integrals.name();
         self.shard.refuse("-o", true)?;
-        let outputs = self.target.of(std::slice::from_ref(&name), overwrite, self.shard)?;
+        let outputs = self.target.of(std::slice::from_ref(&name), overwrite, self.shard, report)?;
         let output = outputs.first();
         let model = FitModel::new(source::model(&self.model)?)?;
         self.check_starts(self.settings.start_unseen().1)?;
@@ -239,11 +207,12 @@ impl Fit {
         if let Some(output) = output {
             best.latent.save(output, overwrite).map_err(with_remedy)?;
         }
-        let images = completed::Images { model, seen, view: self.input.view(), size: self.size, overwrite };
-        if let Some(path) = &self.completed {
+        let images =
+            completed::Images { model, seen, view: self.input.view(), size: self.images.size, overwrite };
+        if let Some(path) = &self.images.completed {
             images.completed(path, &best.latent)?;
         }
-        if let Some(path) = &self.uncertainty {
+        if let Some(path) = &self.images.uncertainty {
             images.uncertainty(path, best)?;
         }
         Ok(())
@@ -328,7 +297,7 @@ impl Fit {
 
     /// One start has nothing to disagree with.
     fn check_starts(&self, starts: usize) -> Result<()> {
-        match &self.uncertainty {
+        match &self.images.uncertainty {
             Some(path) if starts < 2 => {
                 bail!("{}: one start says nothing about uncertainty: give --starts 4 or more", path.display())
             }

@@ -20,6 +20,7 @@ use veni_light::sphere::Equirect;
 use crate::args::{Decoding, Force, Layer};
 use crate::numbers::{finite, positive};
 use crate::output::with_remedy;
+use crate::piped;
 use crate::progress::ProgressBars;
 use crate::report::{self, Outcome, Report};
 use crate::size::Size;
@@ -53,7 +54,7 @@ const SAMPLED: Equirect = Equirect { width: 1024, height: 512 };
         veni-cli ibl sky.hdr --engine any -o out --sun keep --size 512 --json"
 )]
 pub(crate) struct Ibl {
-    /// HDR panorama, latent file, or baked image
+    /// HDR panorama, latent file, or baked image; - is standard input
     #[arg(value_name = "INPUT", group = "sky")]
     input: Option<PathBuf>,
 
@@ -151,7 +152,8 @@ impl Ibl {
         let sky_grid =
             self.sky_size.map(|size| size.equirect().map(|(w, h)| Equirect::new(w, h))).transpose()?;
         let started = Instant::now();
-        let named = Named::new(self.input.as_deref(), self.seed)?;
+        let input = piped::input_if(self.input.as_deref())?;
+        let named = Named::new(input.as_deref(), self.seed)?;
         let grid = sky_grid.unwrap_or(DECODED);
         let panorama = source::radiance(named, &self.layer, &self.decoding, grid, report)?.panorama;
         let mut split = self.split(panorama)?;

@@ -17,6 +17,7 @@ use veni_light::sphere::Equirect;
 use crate::args::{Decoding, Force, Layer};
 use crate::numbers::positive;
 use crate::output::{self, SCENE, with_remedy};
+use crate::piped;
 use crate::printable::printable;
 use crate::report::{Outcome, Report};
 use crate::size::Size;
@@ -53,7 +54,7 @@ const DECODED: (usize, usize) = (512, 256);
         veni-cli light sky.exr --sh three            for three.js' LightProbe"
 )]
 pub(crate) struct Light {
-    /// An HDR panorama or baked image (its pixels are used), or a latent file
+    /// An HDR panorama or baked image (its pixels are used), or a latent file; - is standard input
     #[arg(group = "light", value_name = "PANORAMA|LATENT")]
     input: Option<PathBuf>,
 
@@ -70,11 +71,11 @@ pub(crate) struct Light {
     #[arg(long, value_name = "DEGREES", value_parser = positive)]
     sun_radius: Option<f64>,
 
-    /// Write the panorama without the lights
+    /// Write the panorama without the lights; - is standard output
     #[arg(long, value_name = "OUT.exr")]
     residual: Option<PathBuf>,
 
-    /// Write the panorama with every light as a disc of its radius
+    /// Write the panorama with every light as a disc of its radius; - is standard output
     #[arg(long, value_name = "OUT.exr")]
     sharpened: Option<PathBuf>,
 
@@ -88,7 +89,7 @@ pub(crate) struct Light {
     #[allow(clippy::option_option, reason = "a flag that may have a value")]
     lux: Option<Option<f64>>,
 
-    /// Write the JSON to a file
+    /// Write the JSON to a file; - is standard output
     #[arg(long, short, value_name = "OUT.json")]
     output: Option<PathBuf>,
 
@@ -107,14 +108,18 @@ pub(crate) struct Light {
 }
 
 impl Light {
-    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+    pub(crate) fn run(mut self, report: Report) -> Result<Outcome> {
+        self.residual = piped::output_if(self.residual.as_deref(), "exr")?;
+        self.sharpened = piped::output_if(self.sharpened.as_deref(), "exr")?;
+        self.output = piped::output_if(self.output.as_deref(), "json")?;
         let overwrite = Overwrite::from(self.force);
         let images: Vec<_> = self.residual.iter().chain(&self.sharpened).cloned().collect();
         output::check(&images, &["exr", "hdr"], overwrite)?;
         output::check(self.output.as_slice(), &["json"], overwrite)?;
         let size = self.size.map(Size::equirect).transpose()?;
         let (width, height) = size.unwrap_or(DECODED);
-        let named = Named::new(self.input.as_deref(), self.seed)?;
+        let input = piped::input_if(self.input.as_deref())?;
+        let named = Named::new(input.as_deref(), self.seed)?;
         let grid = Equirect::new(width, height);
         let found = source::radiance(named, &self.layer, &self.decoding, grid, report)?;
         let Radiance { name, panorama, decoded } = found;

@@ -55,7 +55,7 @@ const PLAIN: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
         veni-cli render-probe sky.exr -o ball.exr --size 64 --normals n.exr --mask m.png"
 )]
 pub(crate) struct RenderProbe {
-    /// HDR panoramas, or latent files
+    /// HDR panoramas, or latent files; - is standard input
     #[arg(group = "light", value_name = "PANORAMA|LATENT")]
     sources: Vec<PathBuf>,
 
@@ -66,11 +66,11 @@ pub(crate) struct RenderProbe {
     #[command(flatten)]
     target: Target,
 
-    /// Also write the normals
+    /// Also write the normals; - is standard output
     #[arg(long, value_name = "OUT.exr")]
     normals: Option<PathBuf>,
 
-    /// Also write a mask, white where there is a surface
+    /// Also write a mask, white where there is a surface; - is standard output
     #[arg(long, value_name = "OUT.png")]
     mask: Option<PathBuf>,
 
@@ -78,7 +78,7 @@ pub(crate) struct RenderProbe {
     #[arg(long, value_name = "W|WxH", default_value = "256")]
     size: Size,
 
-    /// Wavefront OBJ file to render instead of a sphere
+    /// Wavefront OBJ file to render instead of a sphere; - is standard input
     #[arg(long, value_name = "FILE.obj")]
     mesh: Option<PathBuf>,
 
@@ -129,7 +129,9 @@ pub(crate) struct RenderProbe {
 }
 
 impl RenderProbe {
-    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+    pub(crate) fn run(mut self, report: Report) -> Result<Outcome> {
+        self.normals = piped::output_if(self.normals.as_deref(), "exr")?;
+        self.mask = piped::output_if(self.mask.as_deref(), "png")?;
         let overwrite = Overwrite::from(self.force);
         let jobs = skies::jobs(&self.sources, self.seed, &self.target, &self.many, overwrite, report)?;
         let size = self.check(&jobs, overwrite)?;
@@ -141,9 +143,7 @@ impl RenderProbe {
         let grid = Equirect::new(self.lights, self.lights / 2);
         let transfer = self.transfer(&surface, grid)?;
         let scene = Scene { surface, camera, grid, transfer };
-        report::each(jobs.into_iter().enumerate(), |(at, job)| {
-            job.run(report, |job, report| self.one(job, &scene, at == 0, report))
-        })
+        report::each(jobs.into_iter().enumerate(), |(at, job)| self.one(&job, &scene, at == 0, report))
     }
 
     /// One light; with the `first` also what is the same under all of them.

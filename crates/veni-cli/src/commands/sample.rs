@@ -1,6 +1,6 @@
 //! `veni-cli sample`: a contact sheet of random skies.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use anyhow::{Result, bail};
@@ -19,7 +19,7 @@ use crate::device::Device;
 use crate::output::{self, with_remedy};
 use crate::piped;
 use crate::progress::ProgressBars;
-use crate::report::{Outcome, Report, to_stdout};
+use crate::report::{Outcome, Report};
 use crate::size::Size;
 use crate::source::{self, Loaded, RandomSkies};
 
@@ -104,20 +104,9 @@ impl Grid {
 
 impl Sample {
     pub(crate) fn run(self, report: Report) -> Result<Outcome> {
-        if piped::is_stdout(&self.output) {
-            piped::check_stdout()?;
-            let sheet = piped::output("png", |path| self.sheet(path, report.beside_stdout()))?;
-            to_stdout(&sheet)?;
-        } else {
-            output::check(std::slice::from_ref(&self.output), &["png"], Overwrite::from(self.force))?;
-            self.sheet(&self.output, report)?;
-        }
-        Ok(Outcome::Fine)
-    }
-
-    /// Writes the sheet to `path`.
-    fn sheet(&self, path: &Path, report: Report) -> Result<()> {
+        let path = piped::output(&self.output, "png")?;
         let overwrite = Overwrite::from(self.force);
+        output::check(std::slice::from_ref(&path), &["png"], overwrite)?;
         let (grid, count) = self.grid()?;
         let (width, height) = self.size.equirect()?;
         if grid.columns.saturating_mul(width).saturating_mul(grid.rows * height) > MAX_PIXELS {
@@ -155,7 +144,7 @@ impl Sample {
             progress.add(1);
         }
         progress.end();
-        sheet.write(path, overwrite).map_err(with_remedy)?;
+        sheet.write(&path, overwrite).map_err(with_remedy)?;
         let Grid { columns, rows } = grid;
         let human = format!(
             "{}: {count} skies, seeds {} to {last}, {columns} x {rows} row by row (on {})",
@@ -174,7 +163,8 @@ impl Sample {
             "device": device.name(),
             "latents": latents,
         });
-        report.result(human, &value)
+        report.result(human, &value)?;
+        Ok(Outcome::Fine)
     }
 
     fn grid(&self) -> Result<(Grid, usize)> {

@@ -20,6 +20,7 @@ use veni_synth::{Overrides, Scene, Setting, SkyKind, generate};
 use crate::args::Force;
 use crate::features::{LEARN, only};
 use crate::output::{self, with_remedy};
+use crate::piped;
 use crate::progress::{ProgressBars, duration};
 use crate::report::{Outcome, Report};
 use crate::shard::Shard;
@@ -101,7 +102,8 @@ pub(crate) struct Synth {
     #[arg(long, value_name = "A")]
     ground_albedo: Option<f32>,
 
-    /// Also write a PNG with the first scenes side by side, tonemapped (98 % quantile is white)
+    /// Also write a PNG with the first scenes side by side, tonemapped (98 % quantile is white); - is
+    /// standard output
     #[arg(long, value_name = "OUT.png")]
     sheet: Option<PathBuf>,
 
@@ -133,7 +135,8 @@ where
 }
 
 impl Synth {
-    pub(crate) fn run(self, report: Report) -> Result<Outcome> {
+    pub(crate) fn run(mut self, report: Report) -> Result<Outcome> {
+        self.sheet = piped::output_if(self.sheet.as_deref(), "png")?;
         let started = Instant::now();
         let overwrite = Overwrite::from(self.force);
         let overrides = self.overrides()?;

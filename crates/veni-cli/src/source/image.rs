@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use veni_image::Panorama;
 
 use crate::args::Layer;
@@ -13,6 +13,12 @@ use crate::report::Report;
 pub(crate) fn panorama(path: &Path, layer: &Layer, report: Report) -> Result<Panorama> {
     let mut panorama = Panorama::read_with(path, &layer.options()).map_err(with_remedy)?;
     notes(path, panorama.notes(), report);
+    if panorama.unknown() >= 1.0 {
+        bail!(
+            "{}: all of it is unknown (transparent, or outside of what the file holds); store it opaque, and within its display window",
+            path.display()
+        );
+    }
     let unknown = 100.0 * panorama.fill();
     if unknown > 0.0 {
         report.note(format_args!(

@@ -100,7 +100,8 @@ pub(super) fn decode(path: &Path, options: &ReadOptions) -> Result<Decoded> {
                 return Err(Error::invalid("truncated JPEG file"));
             }
             let decoder = JpegDecoder::new(Cursor::new(&bytes)).map_err(wrap)?;
-            pixels(decoder, Tags::default(), Some(&bytes), options, wrap)
+            let tags = Tags { has_profile: jpeg::has_profile(&bytes), ..Tags::default() };
+            pixels(decoder, tags, Some(&bytes), options, wrap)
         }
         ImageFormat::WebP => {
             let decoder = WebPDecoder::new(file).map_err(wrap)?;

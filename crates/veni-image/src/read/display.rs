@@ -3,8 +3,8 @@
 use super::exif::{self, ColourSpace};
 use super::meaning::{Curve, Meaning};
 use super::{icc, spaces};
-use crate::Result;
 use crate::colour::{ADOBE_RGB, Primaries};
+use crate::{Error, Result};
 
 /// All that may be said, as it is stored.
 #[derive(Clone, Debug, Default)]
@@ -12,6 +12,8 @@ pub(super) struct Tags {
     /// PNG: primaries and transfer characteristics of H.273.
     pub(super) cicp: Option<[u8; 2]>,
     pub(super) icc: Option<Vec<u8>>,
+    /// PNG, JPEG: there is a profile, be it one that cannot be inflated or put together.
+    pub(super) has_profile: bool,
     /// PNG: the sRGB chunk.
     pub(super) srgb: bool,
     /// PNG: the exponent from light to stored values, 1/2.2 for a display of 2.2.
@@ -38,6 +40,11 @@ pub(super) fn meaning(tags: &Tags) -> Result<Meaning> {
         spaces::h273(primaries, transfer, "cICP chunk")?
     } else if let Some(profile) = &tags.icc {
         icc::meaning(profile)?
+    } else if tags.has_profile {
+        // the decoder passes over it, but the picture's colours are others than without
+        return Err(Error::invalid(
+            "damaged ICC profile: it cannot be inflated, or pieces of it are missing",
+        ));
     } else if tags.srgb {
         Meaning::default()
     } else if tags.gamma.is_some() || tags.chromaticities.is_some() {

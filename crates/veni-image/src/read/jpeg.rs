@@ -52,6 +52,11 @@ pub(super) fn xmp(bytes: &[u8]) -> Option<&str> {
     std::str::from_utf8(packet).ok()
 }
 
+/// Whether there are segments of a colour profile, be it too few or too many.
+pub(super) fn has_profile(bytes: &[u8]) -> bool {
+    segments(bytes).any(|(marker, content)| marker == 0xE2 && content.starts_with(b"ICC_PROFILE\0"))
+}
+
 /// Whether a segment of ISO 21496-1 says that there is a gain map.
 pub(super) fn has_iso_gain_map(bytes: &[u8]) -> bool {
     segments(bytes)

@@ -116,6 +116,10 @@ fn damaged_oversized_and_foreign_files_are_refused() {
     refused("wide.png", &png(6, 2), &["6 × 2", "twice"]);
     refused("b.avif", b"\0\0\0\x20ftypavis\0\0\0\0mif1", &["Animated AVIF", "convert"]);
     refused("a.tif", b"II*\0rest of it", &["TIFF", "convert"]);
+    refused("a.jxl", b"\0\0\0\x0CJXL \r\n\x87\n", &["JPEG XL", "convert"]);
+    refused("a.pfm", b"PF\n8 4\n-1.0\n", &["PFM", "convert"]);
+    refused("a.png", b"version https://git-lfs.github.com/spec/v1\n", &["Git LFS", "git lfs pull"]);
+    refused("b.png", b"<!DOCTYPE html>\n", &["web page", "download"]);
     refused("a.wav", b"RIFF\0\0\0\0WAVEfmt ", &["neither"]);
     refused("nothing", b"", &["empty"]);
     assert!(LdrPanorama::read(folder.path()).unwrap_err().to_string().contains("folder"));

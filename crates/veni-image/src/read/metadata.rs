@@ -69,6 +69,7 @@ pub const METADATA: &[Metadata] = &[
     ),
     row(EXR, "whiteLuminance", Noted, "radiance has no absolute unit here"),
     row(EXR, "adoptedNeutral", Noted, "colours are not balanced by it"),
+    row(EXR, "pixelAspectRatio", Noted, "pixels are taken for square"),
     row(EXR, "alpha", Applied, "colours are divided by it; what is transparent is unknown"),
     row(EXR, "alpha of 0 everywhere beside colours", Noted, "it is ignored"),
     row(EXR, "data window", Applied, "what it leaves of the display window is unknown"),

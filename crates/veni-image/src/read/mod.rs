@@ -211,7 +211,7 @@ fn format(start: &[u8]) -> Option<(ImageFormat, &'static str)> {
 }
 
 /// Formats that are not read: where the name of each stands.
-const FOREIGN: [(usize, &[u8], &str); 7] = [
+const FOREIGN: &[(usize, &[u8], &str)] = &[
     // with the feature `avif` found before
     (4, b"ftypavif", "(built without the feature avif) AVIF"),
     (4, b"ftypavis", "Animated AVIF"),
@@ -220,6 +220,31 @@ const FOREIGN: [(usize, &[u8], &str); 7] = [
     (0, b"GIF8", "GIF"),
     (0, b"II*\0", "TIFF"),
     (0, b"MM\0*", "TIFF"),
+    (0, b"II+\0", "TIFF"),
+    (0, b"MM\0+", "TIFF"),
+    (4, b"ftypheix", "HEIF"),
+    (4, b"ftypmif1", "HEIF"),
+    (0, b"\xFF\x0A", "JPEG XL"),
+    (4, b"JXL \r\n\x87\n", "JPEG XL"),
+    (4, b"jP  \r\n\x87\n", "JPEG 2000"),
+    (0, b"\xFF\x4F\xFF\x51", "JPEG 2000"),
+    (0, b"PF\n", "PFM"),
+    (0, b"Pf\n", "PFM"),
+    (0, b"P5", "PGM"),
+    (0, b"P6", "PPM"),
+    (0, b"SDPX", "DPX"),
+    (0, b"XPDS", "DPX"),
+    (0, b"qoif", "QOI"),
+    (0, b"8BPS", "Photoshop"),
+    (0, b"DDS ", "DDS"),
+];
+
+/// What is saved in place of an image now and then: its beginning, what it is and what to do.
+const IN_PLACE: &[(&[u8], &str)] = &[
+    (b"version https://", "a pointer of Git LFS, not the image; 'git lfs pull' fetches it"),
+    (b"<!DOCTYPE", "a web page, not an image; download the file itself"),
+    (b"<!doctype", "a web page, not an image; download the file itself"),
+    (b"<html", "a web page, not an image; download the file itself"),
 ];
 
 /// The first bytes of a file, which tell its format; rewinds.
@@ -256,6 +281,9 @@ fn stands(start: &[u8], at: usize, name: &[u8]) -> bool {
 fn unknown(start: &[u8], otherwise: &str) -> Error {
     if start.is_empty() {
         return Error::invalid("the file is empty");
+    }
+    if let Some((_, what)) = IN_PLACE.iter().find(|(begin, _)| start.starts_with(begin)) {
+        return Error::unsupported(*what);
     }
     match FOREIGN.iter().find(|(at, magic, _)| stands(start, *at, magic)) {
         Some((.., name)) => Error::unsupported(format!(

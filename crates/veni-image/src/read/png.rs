@@ -45,7 +45,13 @@ pub(super) fn tags(file: &mut (impl BufRead + Seek)) -> Result<Tags> {
                 }
                 tags.cicp = Some([primaries, transfer]);
             }
-            b"gAMA" => tags.gamma = numbers(&body).first().map(|v| v / 100_000.0).filter(|v| *v > 0.0),
+            b"gAMA" => match numbers(&body).first() {
+                Some(0.0) => {
+                    tags.notes.push("its gAMA chunk says 0, which is no exponent: it is ignored".to_owned())
+                }
+                value => tags.gamma = value.map(|v| v / 100_000.0),
+            },
+            b"iCCP" => tags.has_profile = true,
             b"cHRM" => {
                 if let [wx, wy, rx, ry, gx, gy, bx, by] = numbers(&body)[..] {
                     let pairs = [[rx, ry], [gx, gy], [bx, by], [wx, wy]];

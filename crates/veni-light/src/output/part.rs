@@ -140,9 +140,19 @@ fn live() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 fn hidden(name: &std::ffi::OsStr) -> OsString {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let mut hidden = OsString::from(".");
-    hidden.push(name);
+    hidden.push(short(name));
     hidden.push(format!(".{:016x}-{}.{EXTENSION}", process_token(), COUNT.fetch_add(1, Ordering::Relaxed)));
     hidden
+}
+
+/// A name that leaves room for what is added to it: file systems have 255 bytes for each.
+fn short(name: &std::ffi::OsStr) -> std::borrow::Cow<'_, std::ffi::OsStr> {
+    const MOST: usize = 200;
+    if name.len() <= MOST {
+        return name.into();
+    }
+    let name = name.to_string_lossy();
+    OsString::from(&name[..name.floor_char_boundary(MOST)]).into()
 }
 
 #[cfg(test)]
@@ -165,6 +175,8 @@ mod tests {
             assert!(!is_part(Path::new(name)), "{name} is a user's own");
         }
         assert!(is_part(Path::new(&hidden("sky.exr".as_ref()))));
+        let long = "ä".repeat(125) + ".exr";
+        assert!(hidden(long.as_ref()).len() <= 255 && is_part(Path::new(&hidden(long.as_ref()))));
     }
 
     #[test]

@@ -10,6 +10,7 @@ use veni_light::sphere::{Equirect, View};
 
 use crate::args::Layer;
 use crate::output::with_remedy;
+use crate::piped;
 use crate::report::Report;
 use crate::source;
 
@@ -25,7 +26,7 @@ pub(crate) struct Input {
     #[command(flatten)]
     layer: Layer,
 
-    /// Picture of the same size: white is known, black or transparent unknown
+    /// Picture of the same size: white is known, black or transparent unknown; - is standard input
     #[arg(long, value_name = "MASK", requires = "pictures")]
     mask: Option<PathBuf>,
 
@@ -45,6 +46,12 @@ pub(crate) struct Input {
 pub(crate) struct Look([f64; 3]);
 
 impl Input {
+    /// The mask is read with every picture.
+    pub(super) fn keep(&mut self) -> Result<()> {
+        self.mask = piped::input_if(self.mask.as_deref())?;
+        Ok(())
+    }
+
     pub(super) fn view(&self) -> Option<View> {
         let [azimuth, elevation, roll] = self.look.unwrap_or_default().0.map(f64::to_radians);
         self.fov.map(|fov| View { fov: fov.to_radians(), azimuth, elevation, roll })

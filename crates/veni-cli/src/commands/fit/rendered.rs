@@ -17,6 +17,7 @@ use veni_light::sphere::{Equirect, View};
 use super::model::FitModel;
 use crate::numbers::{albedo, fraction, lights, shininess};
 use crate::output::CAMERA;
+use crate::piped;
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Rendered pictures")]
@@ -62,6 +63,13 @@ enum Shading {
 }
 
 impl Rendered {
+    /// Normals and albedo are read with every picture.
+    pub(super) fn keep(&mut self) -> Result<()> {
+        self.normals = piped::input_if(self.normals.as_deref())?;
+        self.albedo_map = piped::input_if(self.albedo_map.as_deref())?;
+        Ok(())
+    }
+
     /// The picture as a function of the light on it.
     pub(super) fn image(
         &self,

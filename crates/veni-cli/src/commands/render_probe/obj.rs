@@ -35,8 +35,8 @@ pub(super) struct Placed {
 /// Reads a file; every triangle has three vertices of its own.
 pub(super) fn read(path: &Path, up: Up) -> Result<Placed> {
     let bytes = read_file(path, "a Wavefront OBJ file that is read", MAX_OBJ_BYTES)?;
-    let text = text::decode(bytes)
-        .map_err(|_| anyhow!("{}: is not text: a Wavefront OBJ file is", path.display()))?;
+    let text =
+        decode(bytes).ok_or_else(|| anyhow!("{}: is not text: a Wavefront OBJ file is", path.display()))?;
     let text = statements(&text);
     let [with, without] = corners(&text);
     at_most("corners of faces", (with + without) as u64, MAX_OBJ_CORNERS).map_err(|e| e.in_file(path))?;
@@ -77,6 +77,16 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Placed> {
     let moved = |[x, y, z]: [f64; 3]| [x - origin[0], y - origin[1], z - origin[2]].map(|c| c as f32);
     let positions = positions.into_iter().map(moved).collect();
     Ok(Placed { mesh: Mesh { positions, normals: (with > 0).then_some(normals), triangles }, origin })
+}
+
+/// Names and comments may be in any of the old code pages, of which nothing here is used: what is not UTF-8 is read all the same. No
+/// text has a zero byte.
+fn decode(bytes: Vec<u8>) -> Option<String> {
+    let is_marked = matches!(bytes.as_slice(), [0xff, 0xfe, ..] | [0xfe, 0xff, ..]);
+    if is_marked || !bytes.contains(&0) && std::str::from_utf8(&bytes).is_ok() {
+        return text::decode(bytes).ok();
+    }
+    (!bytes.contains(&0)).then(|| String::from_utf8_lossy(&bytes).into_owned())
 }
 
 /// The middle of the points where it is far from the origin; else the origin.
@@ -144,6 +154,14 @@ mod tests {
         let text = "# head\nv 1 2 \\\n3 # up\r\nf 1 2 3# side\nv 4 5 6";
         assert_eq!(statements(text), "\nv 1 2  3\nf 1 2 3\nv 4 5 6\n");
         assert_eq!(corners(&statements("f 1//1 2//1 \\\n 3//1 # f 4 5 6\nf 1 2/3 3/4/5")), [4, 2]);
+    }
+
+    #[test]
+    fn comments_of_any_code_page_are_read_past() {
+        let text = decode(b"# W\xfcrfel\nv 1 2 3\n".to_vec()).unwrap();
+        assert_eq!(statements(&text), "\nv 1 2 3\n");
+        assert_eq!(decode(b"\xef\xbb\xbfv 1 2 3".to_vec()).unwrap(), "v 1 2 3");
+        assert_eq!((decode(b"v 1\0".to_vec()), decode(b"\xe9\0".to_vec())), (None, None));
     }
 
     #[test]

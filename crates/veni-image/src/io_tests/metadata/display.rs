@@ -84,6 +84,9 @@ fn gama() {
     close(tagged(1.0), COLOUR);
     close(tagged(0.55556), COLOUR.map(|v| v.powf(1.8)));
     close(tagged(0.45455), COLOUR.map(srgb_to_linear));
+    let none = png(COLOUR, &[(b"gAMA", &[0; 4])]);
+    close(none.first(), COLOUR.map(srgb_to_linear));
+    assert!(none.notes().contains("gAMA chunk says 0"), "{}", none.notes());
 }
 
 fn chrm() {
@@ -114,6 +117,11 @@ fn icc() {
     );
     let grey = ColorProfile::new_gray_with_gamma(1.8).encode().unwrap();
     close(png_icc([0.5; 3], &grey, &[]).first(), [0.5f32.powf(1.8); 3]);
+    // one that the decoder passes over; cICP goes before it
+    let lost: (&[u8; 4], &[u8]) = (b"iCCP", b"P3\0\0no zlib");
+    let error = png(COLOUR, &[lost]).error();
+    assert!(error.contains("ICC profile"), "{error}");
+    close(png(COLOUR, &[lost, (b"cICP", &[1, 13, 0, 1])]).first(), COLOUR.map(srgb_to_linear));
     // code points of high dynamic range in a profile
     let pq = ColorProfile::new_display_p3_pq().encode().unwrap();
     assert!(matches!(png_icc([0.5; 3], &pq, &[]).content().unwrap(), Content::Radiance(_)));
@@ -122,6 +130,10 @@ fn icc() {
     let image = DynamicImage::ImageRgb8(ImageBuffer::from_pixel(16, 8, pixel));
     let expected = from_p3(pixel.0.map(|v| srgb_to_linear(f32::from(v) / 255.0)));
     let tagged = jpeg(&image, &[segment(0xE2, &[b"ICC_PROFILE\0\x01\x01", p3.as_slice()].concat())]);
+    // of two pieces the second is missing
+    let half = segment(0xE2, &[b"ICC_PROFILE\0\x01\x02", p3.as_slice()].concat());
+    let error = File::new(&jpeg(&image, &[half])).error();
+    assert!(error.contains("ICC profile"), "{error}");
     let off = File::new(&tagged).first().iter().zip(expected).fold(0f32, |m, (a, b)| m.max((a - b).abs()));
     assert!(off < 0.01, "JPEG: {off}");
     close(File::new(&webp(&image, b"ICCP", &p3, 0x20)).first(), expected);

@@ -18,6 +18,7 @@ pub(super) const CASES: &[Case] = &[
     ("EXR", "oiio:ColorSpace", oiio),
     ("EXR", "whiteLuminance", white),
     ("EXR", "adoptedNeutral", neutral),
+    ("EXR", "pixelAspectRatio", aspect),
     ("EXR", "alpha", alpha),
     ("EXR", "alpha of 0 everywhere beside colours", no_alpha),
     ("EXR", "data window", window),
@@ -117,6 +118,15 @@ fn oiio() {
     assert_eq!((linear.first(), linear.notes()), (RED, String::new()));
     let other = file(RED, None, text("oiio:ColorSpace", "my space"));
     assert!(other.first() == RED && other.notes().contains("my space"), "{}", other.notes());
+}
+
+fn aspect() {
+    let of = |ratio| file(RED, None, move |shared, _| shared.pixel_aspect = ratio);
+    let wide = of(2.0);
+    assert!(wide.first() == RED && wide.notes().contains("pixelAspectRatio = 2"), "{}", wide.notes());
+    for says_nothing in [1.0, 0.0, f32::NAN] {
+        assert_eq!(of(says_nothing).notes(), "");
+    }
 }
 
 fn white() {

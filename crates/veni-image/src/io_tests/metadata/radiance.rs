@@ -23,6 +23,9 @@ fn file(lines: &str) -> File {
 
 fn exposure() {
     close(file("EXPOSURE=2\nEXPOSURE= 4").first(), [0.125, 0.0625, 0.031_25]);
+    // of the picture that this one was made of
+    let made = file("other.hdr:\n\tEXPOSURE=8\n\tFORMAT=unknown\n  EXPOSURE=8\npcomb other.hdr\nEXPOSURE=2");
+    close(made.first(), [0.5, 0.25, 0.125]);
 }
 
 fn unknown_exposure() {

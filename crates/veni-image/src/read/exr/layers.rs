@@ -82,7 +82,7 @@ pub(super) fn choose(headers: &[Header], options: &ReadOptions) -> Result<Choice
             let channels = channels.take(16).collect::<Vec<_>>().join(", ");
             let vectors = if found.is_empty() { "" } else { " (vectors are not pictures)" };
             Err(Error::unsupported(format!(
-                "no R, G, B or Y channels of a picture among: {channels}{vectors}"
+                "no R, G, B or Y channels of a picture among: {channels}{vectors}; store the picture with R, G and B"
             )))
         }
         None => Err(Error::layers(None::<&str>, names())),

@@ -23,6 +23,9 @@ use crate::{Error, Result};
 use crate::{Panorama, Provenance, RADIANCE_SCALE};
 use veni_light::sphere::Equirect;
 
+/// What is said of several samples to a pixel.
+const DEEP: &str = "a deep EXR image; flatten it to one sample per pixel";
+
 pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -> Result<Panorama> {
     let reader = exr::block::read(file, false).map_err(|e| wrap(e, path))?;
     judge_parts(reader.headers(), options)?;
@@ -128,7 +131,7 @@ fn judge(header: &Header, options: &ReadOptions) -> Result<Equirect> {
         ));
     }
     if header.deep {
-        return Err(Error::unsupported("deep EXR images are not read"));
+        return Err(Error::unsupported(DEEP));
     }
     let Vec2(width, height) = header.shared_attributes.display_window.size;
     let grid = options.check(width, height)?;
@@ -192,7 +195,10 @@ fn utf8(text: &Text) -> String {
 
 fn wrap(error: exr::error::Error, path: &Path) -> Error {
     match error {
-        exr::error::Error::NotSupported(what) => Error::unsupported(format!("EXR: {what}")),
+        exr::error::Error::NotSupported(what) if what.contains("deep") => Error::unsupported(DEEP),
+        exr::error::Error::NotSupported(what) => {
+            Error::unsupported(format!("EXR: {what}; store it with ZIP or another compression of OpenEXR 2"))
+        }
         exr::error::Error::Invalid(what) => Error::invalid(format!("damaged or truncated EXR file: {what}")),
         exr::error::Error::Io(e) => Error::io(path, "read", e),
         exr::error::Error::Aborted => Error::invalid("reading the EXR file was given up"),

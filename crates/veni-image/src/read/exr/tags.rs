@@ -58,6 +58,11 @@ pub(super) fn meaning(header: &Header, text: &BTreeMap<String, String>, coloured
     if let Some(primaries) = primaries.filter(|_| coloured) {
         meaning.primaries(primaries, "chromaticities")?;
     }
+    let aspect = header.shared_attributes.pixel_aspect;
+    // zero and what is no number are said by programs that do not know it
+    if aspect.is_finite() && aspect > 0.0 && aspect != 1.0 {
+        meaning.note(format!("pixelAspectRatio = {aspect} is not applied: pixels are taken for square"));
+    }
     let own = &header.own_attributes;
     if let Some(luminance) = own.white_luminance.filter(|v| *v > 0.0) {
         meaning.note(format!(

@@ -35,8 +35,10 @@ impl Header {
             if line.is_empty() && !first {
                 break;
             }
-            // lines without '=' are the commands that made the picture
-            if let Some((name, value)) = line.split_once('=').filter(|_| !line.starts_with('#')) {
+            // lines without '=' are the commands that made the picture; what is indented was said of another picture, of which this
+            // one was made (Radiance's pcomb, pcompos)
+            if let Some((name, value)) = line.split_once('=').filter(|_| !line.starts_with(['#', ' ', '\t']))
+            {
                 if name.trim() == "FORMAT" {
                     is_xyz = match value.trim() {
                         "32-bit_rle_rgbe" => false,

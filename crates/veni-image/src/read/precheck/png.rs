@@ -133,7 +133,7 @@ fn profile(chunk: &[u8]) -> Result<()> {
         match step.status {
             Ok(MZStatus::Ok) if step.bytes_consumed > 0 || step.bytes_written > 0 => {}
             Err(MZError::Buf) if step.bytes_written > 0 => {}
-            // the end, or damaged: the decoder ignores such profiles
+            // the end, or damaged: whoever asks for its colours refuses it
             _ => return Ok(()),
         }
     }
