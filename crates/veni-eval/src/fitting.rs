@@ -7,8 +7,11 @@ use crate::canonical::Canonical;
 use veni_core::LoadedModel;
 use veni_core::fit::{self, FitConfig, FitResult, FitTarget, Method};
 use veni_data::coarsen::{averaged, coarse_grid};
+use veni_fit::{Observation, unseen};
+use veni_image::Picture;
 use veni_light::latent::Latent;
-use veni_light::sphere::Equirect;
+use veni_light::light::Lights;
+use veni_light::sphere::{Equirect, View};
 
 /// How a latent is fitted to an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,6 +77,58 @@ impl FitSettings {
         let grid = coarse_grid(grid, self.factor);
         let target = FitTarget::panoramas(grid, &images)?;
         fit::fit(subject.fit_decoder(), &target, start, &self.config)
+    }
+}
+
+/// How a latent is fitted to what shows part of the sphere: as `veni-cli fit --likely-sun` does it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnseenSettings {
+    config: FitConfig,
+    /// Of the starts.
+    seed: u64,
+}
+
+impl UnseenSettings {
+    /// [`unseen::config`]; `quick`: at most 100 steps.
+    pub fn new(seed: u64, quick: bool) -> Self {
+        let config = unseen::config();
+        Self { config: if quick { config.in_steps(100) } else { config }, seed }
+    }
+
+    /// Everything that decides a result, beside model and picture.
+    pub fn key(&self) -> Canonical {
+        let grid = [unseen::GRID.width, unseen::GRID.height, unseen::LONGEST];
+        Canonical::of(
+            json!({ "config": self.config, "seed": self.seed, "starts": unseen::STARTS, "sizes": grid }),
+        )
+    }
+
+    /// The latent of a photograph taken by `view`, or of what is known of a panorama, at the picture's exposure; with the compact
+    /// lights in sight of a panorama, and the sun that is likely where none is seen.
+    ///
+    /// # Errors
+    /// As [`fit::best_of`]; if the picture is black or unknown.
+    pub fn fit(&self, subject: &LoadedModel, picture: &Picture, view: Option<&View>) -> Result<Latent> {
+        let most = subject.model().config().lights;
+        let (observation, lights) = match view {
+            Some(view) => (Observation::photograph(picture, view, unseen::LONGEST)?, Lights::default()),
+            None if most == 0 => (Observation::panorama(picture, unseen::GRID)?, Lights::default()),
+            None => {
+                let (rest, lights) = unseen::seen_lights(picture, most)?;
+                (Observation::panorama(&rest, unseen::GRID)?, lights)
+            }
+        };
+        let prior = subject.prior();
+        let (target, starts) = (observation.target().with_prior(&prior), unseen::starts(&prior, self.seed));
+        let mut latent =
+            fit::best_of(subject.fit_decoder(), &target, &starts, &self.config, &mut |_, _| {})?.latent;
+        latent.log_exposure += observation.log_exposure();
+        latent.lights = lights.scaled((-latent.log_exposure).exp());
+        if latent.lights.sun().is_none() {
+            let sun = unseen::likely_sun(&prior, &latent, &observation).map(|(_, sun)| sun);
+            latent.lights = Lights::new(sun, latent.lights.others().iter().copied());
+        }
+        Ok(latent)
     }
 }
 

@@ -6,6 +6,7 @@
 //! | [`fit()`], [`fit_rendered`] | latent optimisation under the folded decoder, of panoramas, parts of them, photographs, lit surfaces |
 //! | [`fit_linear`], [`LinearTarget`] | the same of harmonics, irradiance and illuminance alone; [`targets`] reads them |
 //! | [`Observation`] | from a picture to what can be fitted |
+//! | [`unseen`] | the fit of what shows part of the sphere, and the sun that is likely outside of it |
 //! | [`shade`] | what a surface looks like under distant light, and the gradient of that |
 //! | [`loss`], [`schedule`] | settings that training shares |
 //!
@@ -30,6 +31,7 @@ mod observation;
 pub mod schedule;
 pub mod shade;
 pub mod targets;
+pub mod unseen;
 
 pub use adam::Adam;
 pub use encoder::{Encoded, Encoder};

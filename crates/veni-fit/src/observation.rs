@@ -14,13 +14,20 @@ const LEAST_KNOWN: f32 = 0.1;
 #[derive(Clone, Debug)]
 pub struct Observation {
     grid: Equirect,
-    /// Directions and areas of the pixels of a perspective view.
-    view: Option<(Vec<[f32; 3]>, Vec<f32>)>,
+    perspective: Option<Perspective>,
     log_radiance: Vec<f32>,
     log_exposure: f32,
     /// How much of each pixel is known, if not all of all.
     mask: Option<Vec<f32>>,
     clipped: Option<Vec<bool>>,
+}
+
+/// The pixels of a perspective view.
+#[derive(Clone, Debug)]
+struct Perspective {
+    view: View,
+    directions: Vec<[f32; 3]>,
+    areas: Vec<f32>,
 }
 
 impl Observation {
@@ -87,15 +94,16 @@ impl Observation {
         let clips = clips.map(|clips| average(&|p| clips[p]));
         // what was cut off at the sides is not seen
         let seen = 2.0 * ((0.5 * view.fov).tan() * (w * cw) as f64 / width as f64).atan();
-        let (directions, areas) = View { fov: seen, ..*view }.pixels(w, h);
-        let grid = Equirect::new(w, h);
-        Self::new(grid, Some((directions, areas.clone())), &areas, &sums, known, clips.as_deref())
+        let view = View { fov: seen, ..*view };
+        let (directions, areas) = view.pixels(w, h);
+        let perspective = Perspective { view, directions, areas: areas.clone() };
+        Self::new(Equirect::new(w, h), Some(perspective), &areas, &sums, known, clips.as_deref())
     }
 
     /// `sums` are radiance × known.
     fn new(
         grid: Equirect,
-        view: Option<(Vec<[f32; 3]>, Vec<f32>)>,
+        perspective: Option<Perspective>,
         areas: &[f32],
         sums: &[[f32; 3]],
         mut known: Vec<f32>,
@@ -123,7 +131,7 @@ impl Observation {
         let clipped = clips.map(|clips| clips.as_flattened().iter().map(|c| *c > 0.0).collect::<Vec<_>>());
         Ok(Self {
             grid,
-            view,
+            perspective,
             log_radiance,
             log_exposure,
             mask: known.iter().any(|k| *k < 1.0 - 1e-5).then_some(known),
@@ -158,24 +166,37 @@ impl Observation {
 
     /// Whether some of the sphere is not seen, so that the scene's own exposure is not known.
     pub fn is_partial(&self) -> bool {
-        self.view.is_some() || self.mask.is_some()
+        self.perspective.is_some() || self.mask.is_some()
     }
 
     /// The share of the sphere that is known.
     pub fn share(&self) -> f32 {
         let known = |p: usize| self.mask.as_ref().map_or(1.0, |m| m[p]);
-        let area = |p: usize| match &self.view {
-            Some((_, areas)) => areas[p],
+        let area = |p: usize| match &self.perspective {
+            Some(perspective) => perspective.areas[p],
             None => self.grid.solid_angle(p / self.grid.width) as f32,
         };
         (0..self.grid.len()).map(|p| known(p) * area(p)).sum::<f32>() / (2.0 * TAU)
+    }
+
+    /// Whether what comes from a unit direction is seen.
+    pub fn sees(&self, direction: [f32; 3]) -> bool {
+        let Equirect { width, height } = self.grid;
+        let pixel = match &self.perspective {
+            Some(perspective) => perspective.view.pixel_of(direction, width, height),
+            None => {
+                let [column, row] = self.grid.pixel(direction).map(|v| v as usize);
+                Some(row.min(height - 1) * width + column)
+            }
+        };
+        pixel.is_some_and(|p| self.mask.as_ref().is_none_or(|mask| mask[p] > 0.5))
     }
 
     /// The target of a fit.
     pub fn target(&self) -> FitTarget<'_> {
         let consistent = "an observation is consistent";
         let mut target = FitTarget::panoramas(self.grid, &[&self.log_radiance]).expect(consistent);
-        if let Some((directions, areas)) = &self.view {
+        if let Some(Perspective { directions, areas, .. }) = &self.perspective {
             target = target.in_directions(directions.as_slice(), Some(areas)).expect(consistent);
         }
         if let Some(mask) = &self.mask {

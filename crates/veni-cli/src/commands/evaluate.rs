@@ -12,8 +12,9 @@ use veni_data::{Dataset, Fold, Part};
 use veni_eval::codec::Codec;
 use veni_eval::lpips::{self, Lpips};
 use veni_eval::protocol::{
-    Evaluation, Published, Report as Findings, Settings, ablations, consistency, dataset_size, equivariance,
-    interpolation, inverse_rendering, light, paper, realism, reconstruction, spheres, uniqueness,
+    Evaluation, Published, Report as Findings, Settings, ablations, completion, consistency, dataset_size,
+    equivariance, interpolation, inverse_rendering, light, paper, photo, realism, reconstruction, spheres,
+    uniqueness,
 };
 use veni_eval::store::Store;
 use veni_eval::table::{Format, Table};
@@ -41,8 +42,8 @@ const MIN_HEIGHT: usize = 8;
         Tables go to stdout and, with those of every panorama, into OUT, beside figures (PNG). Whatever takes long is \
         kept in OUT/results, one small file per panorama and setting: run the same command again after a stop and it \
         continues; run it with other models, panoramas or settings and only what is new is computed.\n\n\
-        DIR holds equirectangular OpenEXR or Radiance files; of a folder with train/ and val/ inside, val/ is taken. \
-        Every definition is in docs/MODEL.md, Evaluation.\n\n\
+        DIR holds equirectangular OpenEXR or Radiance files; of a folder with train/ and val/ inside, val/ is taken, and \
+        train/ is what photo and completion know beforehand (--train). Every definition is in docs/MODEL.md, Evaluation.\n\n\
         --shard I/N computes a share of what is kept, and makes no tables; once all shares are there, the same command \
         without it finds them. They may run at once, on machines with one file system.\n\n\
         LPIPS needs weights, which do not come with this program: name a safetensors file or what torch.save wrote, \
@@ -54,6 +55,8 @@ const MIN_HEIGHT: usize = 8;
         veni-cli evaluate reconstruction --model ours=runs/a base=runs/b --data hdri --out eval --quick\n  \
         veni-cli evaluate uniqueness --model runs/a --data hdri --images 20 --out eval --table csv\n  \
         veni-cli evaluate uniqueness --model runs/a --data hdri --out eval --shard 2/4     the second of four\n  \
+        veni-cli evaluate photo --data hdri --size 256 --out eval     the light of photographs, against hdri/train\n  \
+        veni-cli evaluate completion --data mine --train hdri/train --out eval\n  \
         veni-cli evaluate paper --model veni=runs/a reni=runs/r --data hdri --out eval --lpips alexnet.pth alex.pth"
 )]
 pub(crate) struct Evaluate {
@@ -69,6 +72,11 @@ pub(crate) struct Evaluate {
     /// Folders of panoramas (or files)
     #[arg(long, value_name = "DIR", num_args = 1.., required = true)]
     data: Vec<PathBuf>,
+
+    /// Folders of the panoramas that baselines of photo and completion know: their mean and the nearest of them [default: train/
+    /// in or beside each folder of --data]
+    #[arg(long, value_name = "DIR", num_args = 1..)]
+    train: Vec<PathBuf>,
 
     #[command(flatten)]
     layer: Layer,
@@ -148,11 +156,16 @@ pub(crate) enum Protocol {
     Light,
     /// Three balls under decoded light and under the panoramas' own, as light estimation is judged
     Spheres,
+    /// The whole light from a photograph of part of it: irradiance, sun and balls, against the mean and the nearest training
+    /// panorama
+    Photo,
+    /// The hidden half of panoramas, left and lower, against the mean training panorama
+    Completion,
     /// Random skies against photographed ones: sun, shadows, patches
     Realism,
     /// The light on a rendered ball (inverse rendering), from dull to shiny
     InverseRendering,
-    /// All of them but light, spheres and realism, with published numbers to compare with
+    /// All of them but light, spheres, photo, completion and realism, with published numbers to compare with
     Paper,
 }
 
@@ -190,15 +203,28 @@ impl Evaluate {
             );
         }
         let published = self.published.as_deref().map(Published::load).transpose()?.unwrap_or_default();
+        if !self.train.is_empty() && !self.protocol.has_baselines() {
+            bail!(
+                "--train: only 'evaluate photo' and 'evaluate completion' compare with training panoramas; leave it out"
+            );
+        }
         let progress = ProgressBars::new(report);
         let files = inputs::panoramas(&self.data, self.fold, self.images, &progress)?;
+        let known = if self.protocol.has_baselines() && !self.shard.is_part() {
+            inputs::training(&self.train, &self.data, self.fold, &progress)?
+        } else {
+            Vec::new()
+        };
         inputs::check_folder(&self.out)?;
         let device = DeviceKind::Flex;
         let subjects = inputs::subjects(&self.models, device)?;
         let lpips = if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, device)?) };
-        let data = Dataset::load_observed(&files, grid, &self.layer.options(), &progress);
-        progress.end();
-        let data = data.map_err(with_remedy)?;
+        let load = |files: &[PathBuf]| {
+            let data = Dataset::load_observed(files, grid, &self.layer.options(), &progress);
+            progress.end();
+            data.map_err(with_remedy)
+        };
+        let (data, train) = (load(&files)?, if known.is_empty() { None } else { Some(load(&known)?) });
         inputs::create_folder(&self.out)?;
         let (store, figures) = (Store::new(&self.out), self.out.join("figures"));
         let settings =
@@ -209,6 +235,7 @@ impl Evaluate {
             subjects: &subjects,
             others: &others,
             data: &data,
+            train: train.as_ref(),
             lpips: lpips.as_ref(),
             settings,
             store: &store,
@@ -276,6 +303,11 @@ impl Evaluate {
 }
 
 impl Protocol {
+    /// Whether training panoramas stand beside the models.
+    fn has_baselines(self) -> bool {
+        matches!(self, Self::Photo | Self::Completion)
+    }
+
     fn run(self, evaluation: &Evaluation<'_>, published: &Published) -> veni_light::Result<Findings> {
         match self {
             Self::Reconstruction => reconstruction::run(evaluation),
@@ -287,6 +319,8 @@ impl Protocol {
             Self::Ablations => ablations::run(evaluation),
             Self::Light => light::run(evaluation),
             Self::Spheres => spheres::run(evaluation),
+            Self::Photo => photo::run(evaluation),
+            Self::Completion => completion::run(evaluation),
             Self::Realism => realism::run(evaluation),
             Self::InverseRendering => inverse_rendering::run(evaluation),
             Self::Paper => paper::run(evaluation, published),
@@ -305,6 +339,8 @@ impl Protocol {
             Self::Ablations => ablations::keep(evaluation, part),
             Self::Light => light::keep(evaluation, part),
             Self::Spheres => spheres::keep(evaluation, part),
+            Self::Photo => photo::keep(evaluation, part),
+            Self::Completion => completion::keep(evaluation, part),
             Self::InverseRendering => inverse_rendering::keep(evaluation, part),
             Self::Paper => paper::keep(evaluation, part),
         }

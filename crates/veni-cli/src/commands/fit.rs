@@ -35,7 +35,7 @@ use crate::source;
 use images::ImageArgs;
 pub(crate) use input::Input;
 use integrals::Integrals;
-use lit::{Lit, LitArgs, Seen};
+use lit::{Lit, LitArgs};
 use model::FitModel;
 use rendered::Rendered;
 use settings::{Settings, Start};
@@ -152,12 +152,10 @@ impl Fit {
                 let lit = Lit::new(&picture, most).map_err(|e| e.in_file(path))?;
                 let rest = lit.rest.as_ref().unwrap_or(&picture);
                 let observation = self.input.observe(rest, grid).map_err(|e| e.in_file(path))?;
-                let mask = observation.mask().map(<[f32]>::to_vec);
-                let mut fitted = self.fit(path, observation, model, config, report)?;
+                let mut fitted = self.fit(path, &observation, model, config, report)?;
                 lit.put_into(&mut fitted.best);
-                if lit.rest.is_none() {
-                    let seen = Seen { view, mask, grid, size: picture.size() };
-                    self.lit.guess(&model.prior(), &mut fitted.best, &seen, report)?;
+                if lit.lights.sun().is_none() {
+                    self.lit.guess(&model.prior(), &mut fitted.best, &observation, report)?;
                 }
                 if !lit.lights.is_empty() && fitted.scores.is_some() {
                     let whole = self.input.observe(&picture, grid).map_err(|e| e.in_file(path))?;
@@ -221,14 +219,14 @@ impl Fit {
     fn fit(
         &self,
         path: &Path,
-        observation: Observation,
+        observation: &Observation,
         model: &FitModel,
         config: &FitConfig,
         report: Report,
     ) -> Result<Fitted> {
         let started = Instant::now();
         let partial = observation.is_partial();
-        let starts = self.starts(path, &observation, model)?;
+        let starts = self.starts(path, observation, model)?;
         self.check_starts(starts.len())?;
         let vectors = model.latent_vectors();
         let config = self.settings.adapted(*config, partial, vectors);
@@ -242,7 +240,7 @@ impl Fit {
         progress.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         let scores = match (partial, observation.clipped().is_some()) {
-            (false, false) => Some(model.score(&best.latent, &observation)?),
+            (false, false) => Some(model.score(&best.latent, observation)?),
             _ => None,
         };
         // from the image's exposure 0 to its own

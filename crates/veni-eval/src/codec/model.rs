@@ -127,15 +127,18 @@ impl Codec for Optimised<'_> {
 /// The parameters of a light.
 const LIGHT: usize = 7;
 
-/// The coordinates of a single latent; then, of one with lights, its log exposure, whether the first light is the sun, and seven
-/// parameters of each.
+/// The coordinates of a single latent; then, of one with lights, the rest of [`code`].
 fn coordinates(latents: &[Latent]) -> Vec<f32> {
-    let mut all: Vec<f32> = latents.iter().flat_map(|z| z.vectors.iter().flatten().copied()).collect();
-    for z in latents.iter().filter(|z| !z.lights.is_empty()) {
-        all.extend([z.log_exposure, f32::from(u8::from(z.lights.sun().is_some()))]);
-        for CompactLight { direction, irradiance, radius, .. } in z.lights.iter() {
-            all.extend(direction.iter().chain(irradiance).chain([radius]));
-        }
+    let of = |z: &Latent| if z.lights.is_empty() { z.vectors.concat() } else { code(z) };
+    latents.iter().flat_map(of).collect()
+}
+
+/// The coordinates of a latent, its log exposure, whether the first light is the sun, and seven parameters of each light.
+pub(crate) fn code(z: &Latent) -> Vec<f32> {
+    let mut all = z.vectors.concat();
+    all.extend([z.log_exposure, f32::from(u8::from(z.lights.sun().is_some()))]);
+    for CompactLight { direction, irradiance, radius, .. } in z.lights.iter() {
+        all.extend(direction.iter().chain(irradiance).chain([radius]));
     }
     all
 }

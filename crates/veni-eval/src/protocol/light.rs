@@ -16,7 +16,7 @@ use veni_light::light::{CompactLight, EnvironmentMap, LightOptions, luminance};
 use veni_light::sphere::{Equirect, ways};
 
 /// Titles of the columns behind those that name a system.
-const COLUMNS: [&str; 9] = [
+pub(super) const COLUMNS: [&str; 9] = [
     "E error",
     "median",
     "worst",
@@ -91,34 +91,40 @@ fn add(run: &Evaluation<'_>, codec: &dyn Codec, all: &mut Table, each: &mut Tabl
     }
     let first =
         [Cell::text(codec.system()), Cell::text(codec.pass()), Cell::Number(codec.dimension() as f64, 0)];
-    all.push(first.into_iter().chain(summary(&lit)).collect());
+    all.push(first.into_iter().chain(summary(&lit, [&|l| l.error, &|l| l.aligned])).collect());
     Ok(())
 }
 
 fn row(item: &Item, label: &str, lit: &Lit) -> Vec<Cell> {
-    let sun = match lit.sun {
+    let errors = [Cell::Number(lit.error, 3), Cell::Number(lit.aligned, 3)];
+    let named = [Cell::text(item.name()), Cell::text(label)];
+    named.into_iter().chain(errors).chain(sun_cells(lit.sun)).collect()
+}
+
+/// Angle and ratio, or why there is none.
+pub(super) fn sun_cells(sun: Sun) -> [Cell; 2] {
+    match sun {
         Sun::None => ["none"; 2].map(missing),
         Sun::False => ["false sun"; 2].map(missing),
         Sun::Missed => ["missed"; 2].map(missing),
         Sun::Both { degrees, irradiance } => [Cell::Number(degrees, 2), Cell::Number(irradiance, 3)],
-    };
-    let errors = [Cell::Number(lit.error, 3), Cell::Number(lit.aligned, 3)];
-    let named = [Cell::text(item.name()), Cell::text(label)];
-    named.into_iter().chain(errors).chain(sun).collect()
+    }
 }
 
 fn missing(why: &str) -> Cell {
     Cell::Missing(why.to_owned())
 }
 
-fn summary(lit: &[Lit]) -> Vec<Cell> {
+/// One cell per column of [`COLUMNS`]: of `first` the root mean square, median and largest, of `second` the first of these, and of the
+/// suns.
+pub(super) fn summary(lit: &[Lit], [first, second]: [&dyn Fn(&Lit) -> f64; 2]) -> Vec<Cell> {
     let count = lit.len() as f64;
     let rms = |of: &dyn Fn(&Lit) -> f64| (lit.iter().map(|l| of(l).powi(2)).sum::<f64>() / count).sqrt();
     let sorted = |mut values: Vec<f64>| {
         values.sort_by(f64::total_cmp);
         values
     };
-    let errors = sorted(lit.iter().map(|l| l.error).collect());
+    let errors = sorted(lit.iter().map(first).collect());
     let both: Vec<_> = lit
         .iter()
         .filter_map(|l| match l.sun {
@@ -132,10 +138,10 @@ fn summary(lit: &[Lit]) -> Vec<Cell> {
         |value: Option<f64>, digits| value.map_or_else(|| missing("no sun"), |v| Cell::Number(v, digits));
     let times = |sun: Sun| Cell::Number(lit.iter().filter(|l| l.sun == sun).count() as f64, 0);
     vec![
-        Cell::Number(rms(&|l| l.error), 3),
+        Cell::Number(rms(first), 3),
         number(median(&errors), 3),
         number(errors.last().copied(), 3),
-        Cell::Number(rms(&|l| l.aligned), 3),
+        Cell::Number(rms(second), 3),
         number(median(&degrees), 2),
         number(degrees.last().copied(), 2),
         number(median(&ratios), 3),
@@ -155,16 +161,38 @@ fn median(sorted: &[f64]) -> Option<f64> {
 
 /// Log radiance decoded against that of the panorama.
 pub(super) fn compare(grid: Equirect, decoded: &[f32], truth: &[f32]) -> Result<Lit> {
-    let radiance =
-        |log: &[f32]| -> Vec<[f32; 3]> { log.as_chunks().0.iter().map(|p| p.map(f32::exp)).collect() };
-    let (decoded, truth) = (radiance(decoded), radiance(truth));
-    let (found, expected) = (irradiance(grid, &decoded), irradiance(grid, &truth));
-    let logs: Vec<f64> = found.iter().zip(&expected).map(|(a, b)| (a / b).ln()).collect();
-    let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / logs.len() as f64;
-    let level = mean(&mut logs.iter().copied());
-    let error = mean(&mut logs.iter().map(|l| l * l)).sqrt();
-    let aligned = mean(&mut logs.iter().map(|l| (l - level).powi(2))).sqrt();
-    let sun = match (sun(grid, &truth)?, sun(grid, &decoded)?) {
+    let logs = ratios(grid, decoded, truth);
+    let level = mean(logs.iter().copied());
+    Ok(Lit {
+        error: mean(logs.iter().map(|l| l * l)).sqrt(),
+        aligned: mean(logs.iter().map(|l| (l - level).powi(2))).sqrt(),
+        sun: between(sun(grid, truth)?, sun(grid, decoded)?),
+    })
+}
+
+/// ⟨ln E/E_true⟩ over the [`ways`]: the exposure by which decoded light is too bright.
+pub(super) fn level(grid: Equirect, decoded: &[f32], truth: &[f32]) -> f64 {
+    mean(ratios(grid, decoded, truth).into_iter())
+}
+
+/// ln E/E_true of each way.
+fn ratios(grid: Equirect, decoded: &[f32], truth: &[f32]) -> Vec<f64> {
+    let (found, expected) = (irradiance(grid, &radiance(decoded)), irradiance(grid, &radiance(truth)));
+    found.iter().zip(&expected).map(|(a, b)| (a / b).ln()).collect()
+}
+
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    values.sum::<f64>() / count
+}
+
+fn radiance(log: &[f32]) -> Vec<[f32; 3]> {
+    log.as_chunks().0.iter().map(|p| p.map(f32::exp)).collect()
+}
+
+/// What became of the sun of a panorama in another.
+pub(super) fn between(truth: Option<CompactLight>, found: Option<CompactLight>) -> Sun {
+    match (truth, found) {
         (None, None) => Sun::None,
         (None, Some(_)) => Sun::False,
         (Some(_), None) => Sun::Missed,
@@ -174,14 +202,13 @@ pub(super) fn compare(grid: Equirect, decoded: &[f32], truth: &[f32]) -> Result<
             let ratio = f64::from(luminance(b.irradiance)) / f64::from(luminance(a.irradiance));
             Sun::Both { degrees, irradiance: ratio.ln().abs() }
         }
-    };
-    Ok(Lit { error, aligned, sun })
+    }
 }
 
-fn sun(grid: Equirect, radiance: &[[f32; 3]]) -> Result<Option<CompactLight>> {
-    let light =
-        LightOptions { lights: 1, ..LightOptions::default() }.of(EnvironmentMap::new(grid, radiance)?)?;
-    Ok(light.sun().copied())
+/// The sun of log radiance.
+pub(super) fn sun(grid: Equirect, log_radiance: &[f32]) -> Result<Option<CompactLight>> {
+    let options = LightOptions { lights: 1, ..LightOptions::default() };
+    Ok(options.of(EnvironmentMap::new(grid, &radiance(log_radiance))?)?.sun().copied())
 }
 
 /// Irradiance (luminance) of surfaces that face the [`ways`].

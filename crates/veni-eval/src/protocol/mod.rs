@@ -11,15 +11,19 @@
 //! | [`ablations`] | what is each part of the model worth? |
 //! | [`light`] | does what is decoded light things as the panorama does? |
 //! | [`spheres`] | do three balls look as they do under the panorama? |
+//! | [`photo`] | what light does a photograph of part of the scene give? |
+//! | [`completion`] | what is in the hidden half of a panorama? |
 //! | [`realism`] | are random skies like photographed ones? |
 //! | [`inverse_rendering`] | what does the rendered image of a ball tell of the light on it? |
-//! | [`paper`] | all of them but `light`, `spheres` and `realism`, with published numbers beside ours |
+//! | [`paper`] | all of them but `light`, `spheres`, `photo`, `completion` and `realism`, with published numbers beside ours |
 //!
 //! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image; a
 //! [`Part`](veni_data::Part) of it can be computed beforehand by `keep`, in processes that know nothing of each other, without tables or
 //! figures. Once all parts are there, `run` finds them and makes both.
 
 pub mod ablations;
+mod camera;
+pub mod completion;
 pub mod consistency;
 pub mod dataset_size;
 pub mod equivariance;
@@ -28,6 +32,7 @@ pub mod inverse_rendering;
 pub mod light;
 pub mod paper;
 mod patches;
+pub mod photo;
 mod published;
 mod quality;
 pub mod realism;
@@ -35,6 +40,7 @@ pub mod reconstruction;
 pub mod spheres;
 #[cfg(test)]
 mod tests;
+mod training;
 pub mod uniqueness;
 mod work;
 
@@ -51,7 +57,13 @@ use super::table::Table;
 use crate::Result;
 use veni_core::LoadedModel;
 use veni_data::Dataset;
+use veni_image::Panorama;
+use veni_image::tonemap::Tonemap;
 use veni_light::progress::Observer;
+use veni_light::sphere::Equirect;
+
+/// Most columns of a panorama in figures that show many.
+const SHOWN: usize = 128;
 
 /// What can be chosen about the protocols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +93,8 @@ pub struct Evaluation<'a> {
     pub others: &'a [&'a dyn Codec],
     /// The panoramas.
     pub data: &'a Dataset,
+    /// Panoramas of the same size that are known beforehand, for baselines of [`photo`] and [`completion`].
+    pub train: Option<&'a Dataset>,
     /// LPIPS, if there are weights for it.
     pub lpips: Option<&'a Lpips>,
     /// Seeds and effort.
@@ -145,6 +159,18 @@ impl<'a> Evaluation<'a> {
         report.figures.push(path);
         Ok(())
     }
+}
+
+/// The size of panoramas in figures that show many.
+fn shown(grid: Equirect) -> Equirect {
+    if grid.width > SHOWN { Equirect::new(SHOWN, SHOWN / 2) } else { grid }
+}
+
+/// Log radiance as the LDR metrics see it, at the size of [`shown`].
+fn thumbnail(grid: Equirect, log_radiance: &[f32]) -> Vec<[u8; 3]> {
+    let small = Panorama::from_log(grid, log_radiance.as_chunks().0).resample(shown(grid));
+    let tonemap = Tonemap::reference(&small);
+    small.pixels().iter().map(|pixel| tonemap.apply_u8(*pixel)).collect()
 }
 
 /// A model's name may hold anything, a file's name may not.

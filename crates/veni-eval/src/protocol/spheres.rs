@@ -24,11 +24,18 @@ const PERCENTILES: [f64; 2] = [0.001, 0.999];
 /// The balls.
 const BALLS: [&str; 3] = ["diffuse", "matte", "mirror"];
 /// Titles of each ball's columns.
-const COLUMNS: [&str; 9] =
+pub(super) const COLUMNS: [&str; 9] =
     ["Diffuse, si-RMSE", "RMSE", "°", "Matte, si-RMSE", "RMSE ", "° ", "Mirror, si-RMSE", "RMSE  ", "°  "];
 
+/// The mean over panoramas.
+pub(super) fn mean(errors: &[[Errors; 3]]) -> [Errors; 3] {
+    std::array::from_fn(|ball| {
+        std::array::from_fn(|k| errors.iter().map(|e| e[ball][k]).sum::<f64>() / errors.len() as f64)
+    })
+}
+
 /// Errors of one ball: scale-invariant, normalised, angular.
-type Errors = [f64; 3];
+pub(super) type Errors = [f64; 3];
 
 /// Table 1: each codec, means over the panoramas; table 2: each panorama.
 ///
@@ -77,16 +84,13 @@ fn add(
     for (item, errors) in items.iter().zip(&errors) {
         each.push([vec![Cell::text(item.name()), Cell::text(&label)], cells(errors)].concat());
     }
-    let mean = std::array::from_fn(|ball| {
-        std::array::from_fn(|k| errors.iter().map(|e| e[ball][k]).sum::<f64>() / errors.len() as f64)
-    });
     let first =
         vec![Cell::text(codec.system()), Cell::text(codec.pass()), Cell::Number(codec.dimension() as f64, 0)];
-    all.push([first, cells(&mean)].concat());
+    all.push([first, cells(&mean(&errors))].concat());
     Ok(())
 }
 
-fn cells(errors: &[Errors; 3]) -> Vec<Cell> {
+pub(super) fn cells(errors: &[Errors; 3]) -> Vec<Cell> {
     errors
         .iter()
         .flat_map(|[invariant, normalised, angle]| {
@@ -96,7 +100,7 @@ fn cells(errors: &[Errors; 3]) -> Vec<Cell> {
 }
 
 /// The balls' pixels, and the directions that light them.
-struct Balls {
+pub(super) struct Balls {
     grid: Equirect,
     directions: Vec<[f64; 3]>,
     solid_angles: Vec<f64>,
@@ -107,7 +111,7 @@ struct Balls {
 const VIEW: [f64; 3] = [-1.0, 0.0, 0.0];
 
 impl Balls {
-    fn new(grid: Equirect) -> Self {
+    pub(super) fn new(grid: Equirect) -> Self {
         let at = |k: usize| (2 * k + 1) as f64 / SIZE as f64 - 1.0;
         let normal = |k: usize| {
             let (right, up) = (at(k % SIZE), -at(k / SIZE));
@@ -124,7 +128,7 @@ impl Balls {
     }
 
     /// Radiance of every pixel of the three balls under light given as log radiance.
-    fn render(&self, log_radiance: &[f32]) -> [Vec<[f64; 3]>; 3] {
+    pub(super) fn render(&self, log_radiance: &[f32]) -> [Vec<[f64; 3]>; 3] {
         let light: Vec<[f64; 3]> =
             log_radiance.as_chunks().0.iter().map(|p| p.map(|v| f64::from(v).exp())).collect();
         let sum = |weight: &dyn Fn([f64; 3]) -> f64| {
@@ -150,7 +154,7 @@ impl Balls {
         [all(&diffuse), all(&matte), all(&mirror)]
     }
 
-    fn errors(&self, found: &[Vec<[f64; 3]>; 3], truth: &[Vec<[f64; 3]>; 3]) -> [Errors; 3] {
+    pub(super) fn errors(&self, found: &[Vec<[f64; 3]>; 3], truth: &[Vec<[f64; 3]>; 3]) -> [Errors; 3] {
         std::array::from_fn(|ball| errors(&found[ball], &truth[ball]))
     }
 }

@@ -17,6 +17,7 @@ use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
 mod numbers;
+mod unseen;
 
 const GRID: Equirect = Equirect { width: 32, height: 16 };
 
@@ -76,6 +77,7 @@ fn evaluated<T>(
         subjects,
         others: &[&Exact],
         data,
+        train: None,
         lpips: None,
         settings,
         store: &store,

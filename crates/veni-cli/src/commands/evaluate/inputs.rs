@@ -121,6 +121,43 @@ pub(super) fn panoramas(
     Ok(files)
 }
 
+/// The training panoramas that baselines know, by name: those of `train`, else of a `train/` in each folder of `data`, or beside it
+/// where it is a `val/`; with a fold, what it leaves of them.
+pub(super) fn training(
+    train: &[PathBuf],
+    data: &[PathBuf],
+    fold: Option<Fold>,
+    observer: &dyn Observer,
+) -> Result<Vec<PathBuf>> {
+    let near = |folder: &PathBuf| {
+        let folder = folder.canonicalize().ok()?;
+        let beside = || Some(folder.parent()?.join("train")).filter(|_| folder.ends_with("val"));
+        [Some(folder.join("train")), beside()].into_iter().flatten().find(|f| f.is_dir())
+    };
+    let folders = if train.is_empty() { data.iter().filter_map(near).collect() } else { train.to_vec() };
+    if folders.is_empty() {
+        let names: Vec<_> = data.iter().map(|d| d.display().to_string()).collect();
+        bail!(
+            "{}: no train/ in it or beside it; name the folder of training panoramas, which are compared with, with --train",
+            names.join(", ")
+        );
+    }
+    let mut files = Vec::new();
+    for folder in &folders {
+        files.extend(panorama_files(folder, observer)?);
+    }
+    files.sort();
+    files.dedup();
+    if let Some(fold) = fold.filter(|_| train.is_empty() && !files.is_empty()) {
+        files = fold.split(&files).context("--fold")?.1;
+    }
+    if files.is_empty() {
+        let names: Vec<_> = folders.iter().map(|d| d.display().to_string()).collect();
+        bail!("{}: no .exr or .hdr panorama to compare with; name others with --train", names.join(", "));
+    }
+    Ok(files)
+}
+
 /// Refuses a folder that is in use for something else, before any work.
 pub(super) fn check_folder(out: &Path) -> Result<()> {
     if !out.exists() {

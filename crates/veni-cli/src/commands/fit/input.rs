@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use veni_fit::Observation;
+use veni_fit::{Observation, unseen};
 use veni_image::{Picture, ReadOptions, read_mask};
 use veni_light::sphere::{Equirect, View};
 
@@ -13,9 +13,6 @@ use crate::output::with_remedy;
 use crate::piped;
 use crate::report::Report;
 use crate::source;
-
-/// Longest side at which a photograph is fitted, in pixels.
-const LONGEST: usize = 96;
 
 #[derive(Args, Debug)]
 pub(crate) struct Input {
@@ -88,7 +85,7 @@ impl Input {
 
     pub(super) fn observe(&self, picture: &Picture, grid: Equirect) -> veni_light::Result<Observation> {
         match self.view() {
-            Some(view) => Observation::photograph(picture, &view, LONGEST),
+            Some(view) => Observation::photograph(picture, &view, unseen::LONGEST),
             None => Observation::panorama(picture, grid),
         }
     }

@@ -1,20 +1,19 @@
 //! A panorama and its compact lights apart.
 
 use clap::{Args, value_parser};
-use veni_fit::Best;
+use veni_fit::{Best, Observation, unseen};
 use veni_image::Picture;
 use veni_light::Result;
 use veni_light::latent::{Latent, Prior};
-use veni_light::light::{LightOptions, Lights};
-use veni_light::sphere::{Equirect, View};
+use veni_light::light::Lights;
 
 use crate::report::Report;
 
 #[derive(Args, Debug)]
 pub(super) struct LitArgs {
-    /// Take up to N compact lights (the sun, lamps) out of a whole panorama of high dynamic range before the fit, and put them into
-    /// the latent [default: as many as the model was trained without]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8), conflicts_with_all = ["fov", "mask", "normals"])]
+    /// Take up to N compact lights (the sun, lamps) out of what is known of a panorama of high dynamic range before the fit, and put
+    /// them into the latent [default: as many as the model was trained without]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8), conflicts_with_all = ["fov", "normals"])]
     compact_lights: Option<u8>,
 
     /// Of a photograph or part of a panorama that does not show the sun: put the sun into the latent that the model thinks most
@@ -24,19 +23,18 @@ pub(super) struct LitArgs {
 }
 
 impl LitArgs {
-    /// The number of lights that are looked for in a picture, where a model was trained without `usual`: none in part
-    /// of one (`view`: of a photograph), nor where values are cut off.
+    /// The number of lights that are looked for in a picture, where a model was trained without `usual`: none in a photograph
+    /// (`view`), nor where values are cut off.
     pub(super) fn most(&self, usual: usize, picture: &Picture, view: bool, report: Report) -> usize {
         let [width, height] = picture.size();
-        let seen = width == 2 * height && !picture.is_partial() && !view;
-        let whole = seen && picture.clip().is_none() && picture.not_finite() == 0;
+        let measured = width == 2 * height && !view && picture.clip().is_none();
         let most = self.compact_lights.map_or(usual, usize::from);
-        if most > 0 && !whole {
+        if most > 0 && !measured {
             report.note(
-                "note: lights are measured in whole panoramas of high dynamic range; the latent of this picture has none",
+                "note: lights are measured in panoramas of high dynamic range; the latent of this picture has none",
             );
         }
-        if whole { most } else { 0 }
+        if measured { most } else { 0 }
     }
 
     /// The likely sun of every latent of a fit, if that is asked for, where it would not have been seen.
@@ -44,7 +42,7 @@ impl LitArgs {
         &self,
         prior: &Prior,
         best: &mut Best,
-        seen: &Seen,
+        seen: &Observation,
         report: Report,
     ) -> anyhow::Result<()> {
         if !self.likely_sun {
@@ -54,13 +52,13 @@ impl LitArgs {
             anyhow::bail!("--likely-sun: the model knows nothing of suns; name another with --model");
         }
         let likely = |latent: &Latent| {
-            let found = prior.likely_sun(&latent.vectors)?;
-            (found.0 > 0.5 && !seen.has(found.1.direction)).then_some(found)
+            let found = unseen::likely_sun(prior, latent, seen);
+            (Lights::new(found.map(|(_, sun)| sun), latent.lights.others().iter().copied()), found)
         };
         for latent in &mut best.all {
-            latent.lights = Lights::new(likely(latent).map(|(_, light)| light), []);
+            latent.lights = likely(latent).0;
         }
-        let found = likely(&best.latent);
+        let (lights, found) = likely(&best.latent);
         match &found {
             Some((chance, light)) => report.note(format_args!(
                 "a sun at {:.0}°, {:.0}° is likely ({:.0} %)",
@@ -70,35 +68,8 @@ impl LitArgs {
             )),
             None => report.note("no sun is likely where none is seen"),
         }
-        best.latent.lights = Lights::new(found.map(|(_, light)| light), []);
+        best.latent.lights = lights;
         Ok(())
-    }
-}
-
-/// The part of the sphere that a picture shows.
-pub(super) struct Seen {
-    /// Of a photograph.
-    pub(super) view: Option<View>,
-    /// Of part of a panorama: how much of each pixel of `grid` is known.
-    pub(super) mask: Option<Vec<f32>>,
-    pub(super) grid: Equirect,
-    /// Of the picture, pixels.
-    pub(super) size: [usize; 2],
-}
-
-impl Seen {
-    fn has(&self, direction: [f32; 3]) -> bool {
-        match (self.view, &self.mask) {
-            (Some(view), _) => {
-                let [width, height] = self.size;
-                view.pixel_of(direction, width, height).is_some()
-            }
-            (None, Some(mask)) => {
-                let [column, row] = self.grid.pixel(direction).map(|v| v as usize);
-                mask[row.min(self.grid.height - 1) * self.grid.width + column] > 0.5
-            }
-            (None, None) => true,
-        }
     }
 }
 
@@ -111,18 +82,13 @@ pub(super) struct Lit {
 }
 
 impl Lit {
-    /// Up to `most` lights of a whole panorama.
+    /// Up to `most` lights of what is known of a panorama.
     pub(super) fn new(picture: &Picture, most: usize) -> Result<Self> {
         if most == 0 {
             return Ok(Self { rest: None, lights: Lights::default() });
         }
-        let [width, height] = picture.size();
-        // of a resampled panorama values may be a little below 0
-        let pixels = picture.pixels().iter().map(|p| p.map(|v| v.max(0.0))).collect();
-        let options = LightOptions { lights: most, ..LightOptions::default() };
-        let light = options.of_pixels(Equirect::new(width, height), pixels)?;
-        let lights = light.lights().clone();
-        Ok(Self { rest: Some(Picture::new([width, height], light.into_residual())?), lights })
+        let (rest, lights) = unseen::seen_lights(picture, most)?;
+        Ok(Self { rest: Some(rest), lights })
     }
 
     /// The lights into every latent that was fitted to the rest, at its exposure.

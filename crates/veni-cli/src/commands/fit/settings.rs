@@ -5,19 +5,14 @@ use clap::{Args, ValueEnum};
 #[cfg(feature = "learn")]
 use veni_fit::loss::LossConfig;
 use veni_fit::schedule::LearningRate;
-use veni_fit::{FitConfig, Method, Objective, Plateau};
+use veni_fit::unseen::{self, PLATEAU};
+use veni_fit::{FitConfig, Method, Objective};
 use veni_light::sphere::Equirect;
 
 use crate::size::Size;
 
-/// Starts where part of the sphere is unknown: enough to see where they disagree.
-const STARTS: usize = 4;
-/// Weight of the prior there: what is unknown has nothing else to go by.
-const PRIOR: f64 = 0.02;
-/// The same for the light on a surface.
+/// Weight of the prior for the light on a surface.
 const LIGHT_PRIOR: f64 = 1e-4;
-/// A plateau: N steps in which the loss falls by less than this fraction.
-const PLATEAU: Plateau = Plateau { patience: 50, improvement: 1e-3 };
 
 #[derive(Args, Debug)]
 pub(super) struct Settings {
@@ -246,7 +241,7 @@ impl Settings {
     /// What depends on whether part of the sphere is unknown, and on the latent's number of vectors.
     pub(super) fn adapted(&self, config: FitConfig, partial: bool, vectors: usize) -> FitConfig {
         let prior = match (self.prior, self.preset) {
-            (None, Preset::Thorough | Preset::Display | Preset::Energy) if partial => PRIOR,
+            (None, Preset::Thorough | Preset::Display | Preset::Energy) if partial => unseen::PRIOR,
             (None, Preset::Thorough | Preset::Display | Preset::Energy) => FitConfig::prior_for(vectors),
             _ => config.prior,
         };
@@ -271,7 +266,7 @@ impl Settings {
             None if whole && has_encoder && self.preset.starts_at_the_encoder() => Start::Encoder,
             None => Start::Zero,
         };
-        let default = if whole { 1 } else { STARTS };
+        let default = if whole { 1 } else { unseen::STARTS };
         (start, self.starts.unwrap_or(default).max(1))
     }
 
@@ -286,12 +281,14 @@ impl Settings {
 
     /// Where a panorama is fitted.
     pub(super) fn grid(&self, partial: bool) -> Result<Equirect> {
-        let (width, height) = match self.resolution {
-            Some(size) => size.equirect().context("--resolution")?,
-            None if partial => (64, 32),
-            None => (128, 64),
-        };
-        Ok(Equirect::new(width, height))
+        Ok(match self.resolution {
+            Some(size) => {
+                let (width, height) = size.equirect().context("--resolution")?;
+                Equirect::new(width, height)
+            }
+            None if partial => unseen::GRID,
+            None => Equirect::new(128, 64),
+        })
     }
 }
 
