@@ -10,6 +10,7 @@ use crate::vae::{Decoder, Veni, veni};
 use crate::{Error, Result};
 use veni_light::field;
 use veni_light::latent::{Latent, Prior};
+use veni_light::light::LightOptions;
 use veni_light::model::{Model, ModelKind};
 use veni_light::sphere::{Equirect, Stripes};
 
@@ -172,11 +173,25 @@ impl LoadedModel {
     /// # Errors
     /// As [`Item::split`](veni_data::Item::split).
     pub fn without_lights<'a>(&self, grid: Equirect, image: &'a [f32]) -> Result<Rest<'a>> {
+        self.without_lights_up_to(grid, image, std::f32::consts::PI)
+    }
+
+    /// [`LoadedModel::without_lights`] with no light of an angular radius above `widest`, radians.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn without_lights_up_to<'a>(
+        &self,
+        grid: Equirect,
+        image: &'a [f32],
+        widest: f32,
+    ) -> Result<Rest<'a>> {
         let lights = self.model.config().lights;
         if lights == 0 {
             return Ok(Rest { log_radiance: image.into(), code: Latent::default() });
         }
-        let item = veni_data::Item::split_log(grid, image, lights)?;
+        let options = LightOptions { lights, widest, ..LightOptions::default() };
+        let item = veni_data::Item::split_log(grid, image, options)?;
         let code = Latent { lights: item.lights, log_exposure: item.log_exposure, ..Latent::default() };
         Ok(Rest { log_radiance: item.log_radiance.to_vec().into(), code })
     }

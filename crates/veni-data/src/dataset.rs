@@ -49,23 +49,30 @@ impl Item {
     /// [`Error::Invalid`] if the panorama holds a value that is not finite, or `lights` is more than
     /// [`LightOptions::MOST`].
     pub fn split(path: &Path, panorama: Panorama, grid: Equirect, lights: usize) -> Result<Self> {
-        if lights == 0 {
+        Self::split_by(path, panorama, grid, LightOptions { lights, ..LightOptions::default() })
+    }
+
+    /// [`Item::split`] with other options than the number of lights.
+    ///
+    /// # Errors
+    /// As [`Item::split`]; also for options that no light satisfies.
+    pub fn split_by(path: &Path, panorama: Panorama, grid: Equirect, options: LightOptions) -> Result<Self> {
+        if options.lights == 0 {
             return Ok(Self::new(path, &panorama, grid));
         }
         let full = panorama.grid();
-        let light =
-            LightOptions { lights, ..LightOptions::default() }.of_pixels(full, panorama.into_pixels())?;
+        let light = options.of_pixels(full, panorama.into_pixels())?;
         let lights = light.lights().clone();
         let item = Self::new(path, &Panorama::new(full, light.into_residual()), grid);
         Ok(Self { lights: lights.scaled((-item.log_exposure).exp()), ..item })
     }
 
-    /// [`Item::split`] of log radiance on `grid`, 3·W·H values. [`Item::log_exposure`] is what the rest lies above or below exposure 0.
+    /// [`Item::split_by`] of log radiance on `grid`, 3·W·H values. [`Item::log_exposure`] is what the rest lies above or below exposure 0.
     ///
     /// # Errors
     /// As [`Item::split`].
-    pub fn split_log(grid: Equirect, log_radiance: &[f32], lights: usize) -> Result<Self> {
-        Self::split(Path::new(""), Panorama::from_log(grid, log_radiance.as_chunks().0), grid, lights)
+    pub fn split_log(grid: Equirect, log_radiance: &[f32], options: LightOptions) -> Result<Self> {
+        Self::split_by(Path::new(""), Panorama::from_log(grid, log_radiance.as_chunks().0), grid, options)
     }
 
     /// File name without extension.

@@ -30,6 +30,12 @@ impl FitSettings {
         Self { config, factor: dividing(grid, if quick { 4 } else { 2 }) }
     }
 
+    /// With the objective of codes with lights, [`FitConfig::lit`].
+    #[must_use]
+    pub fn lit(self) -> Self {
+        Self { config: FitConfig { objective: FitConfig::lit().objective, ..self.config }, ..self }
+    }
+
     /// The reference implementation's helper: 2000 steps on every pixel, rates from `rates[0]` to `rates[1]`; `quick`:
     /// 300 steps on a sixteenth of the pixels.
     pub fn reference(grid: Equirect, rates: [f64; 2], quick: bool) -> Self {
@@ -114,7 +120,7 @@ impl UnseenSettings {
             Some(view) => (Observation::photograph(picture, view, unseen::LONGEST)?, Lights::default()),
             None if most == 0 => (Observation::panorama(picture, unseen::GRID)?, Lights::default()),
             None => {
-                let (rest, lights) = unseen::seen_lights(picture, most)?;
+                let (rest, lights) = unseen::seen_lights(picture, most, std::f32::consts::PI)?;
                 (Observation::panorama(&rest, unseen::GRID)?, lights)
             }
         };

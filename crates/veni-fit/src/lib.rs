@@ -3,7 +3,7 @@
 //! | here | what |
 //! |---|---|
 //! | [`Encoder`] | the VN-ViT in plain f32: from a panorama to the posterior over latents |
-//! | [`fit()`], [`fit_rendered`] | latent optimisation under the folded decoder, of panoramas, parts of them, photographs, lit surfaces |
+//! | [`fit()`], [`fit_lobes`], [`fit_rendered`] | latent optimisation under the folded decoder, of panoramas, parts of them, photographs, lit surfaces |
 //! | [`fit_linear`], [`LinearTarget`] | the same of harmonics, irradiance and illuminance alone; [`targets`] reads them |
 //! | [`Observation`] | from a picture to what can be fitted |
 //! | [`unseen`] | the fit of what shows part of the sphere, and the sun that is likely outside of it |
@@ -37,9 +37,9 @@ pub use adam::Adam;
 pub use encoder::{Encoded, Encoder};
 pub use fit::{
     Achieved, Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient,
-    LinearTarget, LobePlan, Method, Objective, PanoramaLoss, Plateau, Received, best_light, best_linear,
-    best_of, fit, fit_linear, fit_lobes, fit_rendered, fit_with, from_each, likely_linear, matching_exposure,
-    random_starts,
+    LinearTarget, LobePlan, Method, Objective, PanoramaLoss, Plateau, Received, WIDEST_LIGHT, best_light,
+    best_linear, best_of, fit, fit_linear, fit_lobes, fit_rendered, fit_with, from_each, likely_linear,
+    matching_exposure, random_starts,
 };
 pub use observation::Observation;
 pub use veni_light::{Error, Result};

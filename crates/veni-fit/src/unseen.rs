@@ -40,13 +40,14 @@ pub fn likely_sun(prior: &Prior, latent: &Latent, observation: &Observation) -> 
     (chance > 0.5 && !observation.sees(sun.direction)).then_some((chance, sun))
 }
 
-/// Up to `most` compact lights of what is known of a panorama of radiance, and the panorama without them. A field that was trained
+/// Up to `most` compact lights of what is known of a panorama of radiance, none of an angular radius above `widest` (radians), and
+/// the panorama without them. A field that was trained
 /// without suns should not see them, and a sun in sight leaves none to be guessed.
 ///
 /// # Errors
 /// [`Error::Invalid`] if the picture is not twice as wide as high, no pixel is known to have positive radiance, or `most` is more
 /// than [`LightOptions::MOST`].
-pub fn seen_lights(picture: &Picture, most: usize) -> Result<(Picture, Lights)> {
+pub fn seen_lights(picture: &Picture, most: usize, widest: f32) -> Result<(Picture, Lights)> {
     let [width, height] = picture.size();
     let grid = Equirect::new(width, height);
     if width != 2 * height {
@@ -79,7 +80,7 @@ pub fn seen_lights(picture: &Picture, most: usize) -> Result<(Picture, Lights)> 
             *pixel = pixel.map(|v| if *k > 0.0 { k * v + (1.0 - k) * even } else { even });
         }
     }
-    let light = LightOptions { lights: most, ..LightOptions::default() }.of_pixels(grid, pixels)?;
+    let light = LightOptions { lights: most, widest, ..LightOptions::default() }.of_pixels(grid, pixels)?;
     let lights = light.lights().clone();
     let rest = Picture::new([width, height], light.into_residual())?;
     Ok((if partial { rest.masked(&known)? } else { rest }, lights))

@@ -53,6 +53,11 @@ pub(crate) struct Encode {
     #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8))]
     compact_lights: Option<u8>,
 
+    /// Add K spherical Gaussians to the latent, which fit what the encoder's vectors leave of the panorama: detail of 7 numbers
+    /// each. Lights are then no wider than 1.5°. 'fit --lobes' fits the vectors with them
+    #[arg(long, value_name = "K", default_value_t = 0, hide_default_value = true, value_parser = value_parser!(u16).range(0..=256))]
+    lobes: u16,
+
     /// Also write a PNG: panorama | reconstruction, one pair per row; - is standard output
     #[arg(long, value_name = "OUT.png")]
     preview: Option<PathBuf>,
@@ -76,7 +81,7 @@ impl Encode {
         let overwrite = Overwrite::from(self.force);
         let outputs = self.outputs(overwrite, report)?;
         let loaded = source::model(&self.model)?;
-        let encoding = Encoding::new(&loaded, self.compact_lights.map(usize::from))?;
+        let encoding = Encoding::new(&loaded, self.compact_lights.map(usize::from), usize::from(self.lobes))?;
         let mut sheet =
             self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
         self.shard.note_idle(self.panoramas.len(), report);
@@ -157,8 +162,12 @@ fn print(path: &Path, output: Option<&PathBuf>, encoded: &Encoded, report: Repor
                 (None, others) => format!(", {others} lights"),
                 (Some(_), others) => format!(", the sun and {others} lights"),
             };
+            let lobes = match encoded.latent.lobes.len() {
+                0 => String::new(),
+                lobes => format!(", {lobes} lobes"),
+            };
             let human = format!(
-                "{}: {n} vectors{lights}, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB",
+                "{}: {n} vectors{lights}{lobes}, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB",
                 output.display()
             );
             report.result(human, &())

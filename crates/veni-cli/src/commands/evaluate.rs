@@ -97,6 +97,10 @@ pub(crate) struct Evaluate {
     #[arg(long, value_enum, num_args = 1.., default_values_t = [BaselineName::Sh, BaselineName::Sg])]
     baselines: Vec<BaselineName>,
 
+    /// Also rows of each model with K lobes fitted to each panorama beside its vectors (reconstruction, light, spheres)
+    #[arg(long, value_name = "K", num_args = 1..)]
+    lobes: Vec<usize>,
+
     /// Fewer steps, pixels and pairs: a trend in minutes
     #[arg(long)]
     quick: bool,
@@ -234,6 +238,7 @@ impl Evaluate {
         let evaluation = Evaluation {
             subjects: &subjects,
             others: &others,
+            lobes: &self.lobes,
             data: &data,
             train: train.as_ref(),
             lpips: lpips.as_ref(),

@@ -16,7 +16,7 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
-use veni_fit::{Best, FitConfig, Observation, best_light, random_starts};
+use veni_fit::{Best, FitConfig, FitTarget, LobePlan, Observation, best_light, fit_lobes, random_starts};
 use veni_image::Picture;
 use veni_image::metrics::Scores;
 use veni_light::latent::Latent;
@@ -65,6 +65,7 @@ use settings::{Settings, Start};
         veni-cli fit ball.exr --normals n.exr --mask m.png --ks 0.2 -o light.json --completed light.exr\n  \
         veni-cli light sky.exr -o light.json && veni-cli fit --target-sh light.json -o sky.json\n  \
         veni-cli fit sky.exr --illuminance 20000 -o sky.json      radiance in cd/m², 20,000 lux on the ground\n  \
+        veni-cli fit sky.exr --lobes 38 -o sky.json      a code of D = 300: vectors, the sun, lobes for detail\n  \
         veni-cli fit sky.exr --preset display -o sky.json && veni-cli bake sky.json -o again.exr"
 )]
 pub(crate) struct Fit {
@@ -128,8 +129,9 @@ impl Fit {
         let pictures = &self.input.pictures;
         self.shard.note_idle(pictures.len(), report);
         self.settings.grid(false)?;
-        let config = self.settings.config(self.rendered.normals.is_some())?;
         let model = FitModel::new(source::model(&self.model)?)?;
+        let lit = model.lights() > 0 || self.lit.lobes() > 0;
+        let config = self.settings.config(self.rendered.normals.is_some(), lit)?;
         report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
             self.one(&piped::input(path)?, outputs.get(at), &model, &config, report)
         })
@@ -149,7 +151,7 @@ impl Fit {
             None => {
                 let (grid, view) = (self.settings.grid(picture.is_partial())?, self.input.view());
                 let most = self.lit.most(model.lights(), &picture, view.is_some(), report);
-                let lit = Lit::new(&picture, most).map_err(|e| e.in_file(path))?;
+                let lit = Lit::new(&picture, most, self.lit.widest()).map_err(|e| e.in_file(path))?;
                 let rest = lit.rest.as_ref().unwrap_or(&picture);
                 let observation = self.input.observe(rest, grid).map_err(|e| e.in_file(path))?;
                 let mut fitted = self.fit(path, &observation, model, config, report)?;
@@ -239,6 +241,9 @@ impl Fit {
         });
         progress.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
+        if self.lit.lobes() > 0 {
+            best = self.add_lobes(&best, &target, model, &config, report).map_err(|e| e.in_file(path))?;
+        }
         let scores = match (partial, observation.clipped().is_some()) {
             (false, false) => Some(model.score(&best.latent, observation)?),
             _ => None,
@@ -249,6 +254,36 @@ impl Fit {
         }
         let known = Some(observation.share());
         Ok(Fitted { best, known, scores, seconds: started.elapsed().as_secs_f64() })
+    }
+
+    /// The lobes into the latents of all starts.
+    fn add_lobes(
+        &self,
+        best: &Best,
+        target: &FitTarget<'_>,
+        model: &FitModel,
+        config: &FitConfig,
+        report: Report,
+    ) -> veni_light::Result<Best> {
+        let plan = LobePlan { count: self.lit.lobes(), only_lobes: false };
+        let progress = ProgressBars::new(report);
+        progress.begin("lobes", "start", Some(best.all.len() as u64));
+        let one = |latent: &Latent| {
+            let found = fit_lobes(
+                model.decoder(),
+                target,
+                std::slice::from_ref(latent),
+                plan,
+                config,
+                &mut |_, _| {},
+            )?;
+            progress.add(1);
+            Ok(found)
+        };
+        let found = best.all.iter().map(one).collect::<veni_light::Result<Vec<_>>>();
+        progress.end();
+        let (all, losses) = found?.into_iter().flatten().unzip();
+        Ok(Best::of(all, losses))
     }
 
     /// The light on a surface.
@@ -348,6 +383,10 @@ impl Fit {
             return lines_to_stdout(&format!("{}\n", printable_json(&text)));
         };
         let (n, stops) = (best.latent.vectors.len(), best.latent.log_exposure / std::f32::consts::LN_2);
+        let lobes = match best.latent.lobes.len() {
+            0 => String::new(),
+            lobes => format!(", {lobes} lobes"),
+        };
         let quality = match (scores, known) {
             (Some(s), _) => format!("LDR PSNR {:.1} dB", s.ldr_psnr),
             (None, Some(known)) => format!("{:.0} % of the sphere known", 100.0 * known),
@@ -357,7 +396,7 @@ impl Fit {
         let starts = if count > 1 { format!(", best of {count} starts") } else { String::new() };
         report.result(
             format!(
-                "{}: {n} vectors, exposure {stops:+.2} stops, loss {:.4}, {quality}{starts} ({seconds:.1} s)",
+                "{}: {n} vectors{lobes}, exposure {stops:+.2} stops, loss {:.4}, {quality}{starts} ({seconds:.1} s)",
                 output.display(),
                 best.loss
             ),

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use veni_data::Item;
-use veni_fit::Encoder;
+use veni_fit::{Encoder, FitConfig, FitTarget, LobePlan, WIDEST_LIGHT, fit_lobes};
 use veni_image::Panorama;
 use veni_image::metrics::{Alignment, Scores, scores};
-use veni_light::field::Field;
-use veni_light::latent::Latent;
+use veni_light::field::{Decoder, Field};
+use veni_light::latent::{Latent, Lobe};
+use veni_light::light::LightOptions;
 use veni_light::sphere::Equirect;
 
 use super::image::panorama;
@@ -34,11 +35,13 @@ pub(crate) struct Encoding<'a> {
     encoder: Encoder,
     /// The number of lights that are taken out of a panorama and put into its latent.
     lights: usize,
+    /// The number of lobes that are added.
+    lobes: usize,
 }
 
 impl<'a> Encoding<'a> {
-    /// With as many lights as the model's codes have, or as are asked for.
-    pub(crate) fn new(loaded: &'a Loaded, lights: Option<usize>) -> Result<Self> {
+    /// With as many lights as the model's codes have, or as are asked for, and `lobes` lobes.
+    pub(crate) fn new(loaded: &'a Loaded, lights: Option<usize>, lobes: usize) -> Result<Self> {
         if !loaded.model.has_encoder() {
             bail!(
                 "{}: this model has no encoder, it decodes only; name one that has with --model FILE",
@@ -46,7 +49,7 @@ impl<'a> Encoding<'a> {
             );
         }
         let encoder = Encoder::new(&loaded.model).map_err(|e| e.in_file(&loaded.name))?;
-        Ok(Self { loaded, encoder, lights: lights.unwrap_or(loaded.model.config().lights) })
+        Ok(Self { loaded, encoder, lights: lights.unwrap_or(loaded.model.config().lights), lobes })
     }
 
     /// Reads, encodes, and decodes again to compare.
@@ -54,27 +57,50 @@ impl<'a> Encoding<'a> {
         let panorama = panorama(path, layer, report)?;
         let grid = Equirect::new(GRID[0], GRID[1]);
         let whole = Item::new(path, &panorama, grid);
+        let widest = if self.lobes > 0 { WIDEST_LIGHT } else { std::f32::consts::PI };
         let item = match self.lights {
             0 => whole.clone(),
-            most => Item::split(path, panorama.clone(), grid, most).map_err(|e| e.in_file(path))?,
+            lights => {
+                let options = LightOptions { lights, widest, ..LightOptions::default() };
+                Item::split_by(path, panorama.clone(), grid, options).map_err(|e| e.in_file(path))?
+            }
         };
         let encoded =
             self.encoder.encode(grid, &[&item.log_radiance]).map_err(|e| e.in_file(&self.loaded.name))?;
         let vectors = encoded.into_iter().next().map(|e| e.vectors).unwrap_or_default();
+        let decoder = self.loaded.model.decoder().map_err(|e| e.in_file(&self.loaded.name))?;
+        let lobes = self.lobes(&decoder, grid, &item.log_radiance, &vectors).map_err(|e| e.in_file(path))?;
         let latent = Latent {
             vectors,
+            lobes,
             lights: item.lights,
             log_exposure: item.log_exposure,
             model: Some(self.loaded.model.hash()),
             source: Some(source_of(path)),
-            ..Latent::default()
         };
-        let decoder = self.loaded.model.decoder().map_err(|e| e.in_file(&self.loaded.name))?;
         let field = decoder.condition(&latent).map_err(|e| e.in_file(path))?;
         // the paper's protocol, as in training, on the panorama as a whole
         let decoded = Panorama::new(grid, field.bake(grid)).log();
         let prediction: Vec<f32> = decoded.as_flattened().iter().map(|v| v - whole.log_exposure).collect();
         let scores = scores(&prediction, &whole.log_radiance, grid.height, grid.width, Alignment::LogFactor);
         Ok(Encoded { latent, scores, panorama, field })
+    }
+
+    /// What lobes add to the encoder's vectors, which stay as they are.
+    fn lobes(
+        &self,
+        decoder: &Decoder,
+        grid: Equirect,
+        log_radiance: &[f32],
+        vectors: &[[f32; 3]],
+    ) -> veni_light::Result<Vec<Lobe>> {
+        if self.lobes == 0 {
+            return Ok(Vec::new());
+        }
+        let (images, plan) = ([log_radiance], LobePlan { count: self.lobes, only_lobes: true });
+        let target = FitTarget::panoramas(grid, &images)?;
+        let start = [Latent::new(vectors.to_vec())];
+        let found = fit_lobes(decoder, &target, &start, plan, &FitConfig::lit(), &mut |_, _| {})?;
+        Ok(found.into_iter().flat_map(|(latent, _)| latent.lobes).collect())
     }
 }

@@ -194,7 +194,7 @@ fn is_cube_map(path: &Path) -> Result<bool> {
 }
 
 fn encode(path: &Path, layer: &Layer, loaded: &Loaded, why: &str, report: Report) -> Result<Latent> {
-    let encoded = super::encoding::Encoding::new(loaded, None)?.encode_file(path, layer, report)?;
+    let encoded = super::encoding::Encoding::new(loaded, None, 0)?.encode_file(path, layer, report)?;
     report.note(format_args!("{}: {why}; the panorama was encoded", path.display()));
     Ok(encoded.latent)
 }

@@ -4,9 +4,11 @@
 //! one.
 
 mod basis;
+mod lobes;
 pub(crate) mod model;
 
 pub use basis::Basis;
+pub use lobes::Lobed;
 pub use model::{Autoencoder, Optimised};
 
 use crate::Result;

@@ -125,7 +125,7 @@ impl Codec for Optimised<'_> {
 }
 
 /// The parameters of a light.
-const LIGHT: usize = 7;
+pub(super) const LIGHT: usize = 7;
 
 /// The coordinates of a single latent; then, of one with lights, the rest of [`code`].
 fn coordinates(latents: &[Latent]) -> Vec<f32> {

@@ -48,7 +48,7 @@ use std::path::{Path, PathBuf};
 
 pub use published::Published;
 
-use super::codec::{Autoencoder, Codec, Optimised};
+use super::codec::{Autoencoder, Codec, Lobed, Optimised};
 use super::figure::{LabelledSheet, Plot};
 use super::fitting::FitSettings;
 use super::lpips::Lpips;
@@ -91,6 +91,8 @@ pub struct Evaluation<'a> {
     pub subjects: &'a [LoadedModel],
     /// Rows beside the models' own in reconstruction tables: classical bases of equal D.
     pub others: &'a [&'a dyn Codec],
+    /// Numbers of lobes: a row of each beside the models' own passes.
+    pub lobes: &'a [usize],
     /// The panoramas.
     pub data: &'a Dataset,
     /// Panoramas of the same size that are known beforehand, for baselines of [`photo`] and [`completion`].
@@ -130,18 +132,30 @@ impl std::fmt::Debug for Evaluation<'_> {
 }
 
 impl<'a> Evaluation<'a> {
-    /// The models' passes that are compared: autoencoder where there is an encoder, and optimised.
+    /// The models' passes that are compared: autoencoder where there is an encoder, optimised, and with each number of lobes.
     fn codecs(&self, subject: &'a LoadedModel) -> Vec<Box<dyn Codec + 'a>> {
         let fit = FitSettings::thorough(self.data.grid(), self.settings.quick);
+        let fit = if subject.model().config().lights > 0 { fit.lit() } else { fit };
         let pass = Autoencoder::new(subject).map(|codec| Box::new(codec) as Box<dyn Codec>);
-        pass.into_iter().chain([Box::new(Optimised::new(subject, fit)) as Box<dyn Codec>]).collect()
+        let with =
+            |count: &usize| Box::new(Lobed::new(subject, *count, self.settings.quick)) as Box<dyn Codec>;
+        let optimised = Box::new(Optimised::new(subject, fit)) as Box<dyn Codec>;
+        pass.into_iter().chain([optimised]).chain(self.lobes.iter().map(with)).collect()
     }
 
     /// How the optimised pass fits, in words.
     fn optimised_note(&self) -> String {
         let fit = FitSettings::thorough(self.data.grid(), self.settings.quick);
+        let lit = self.subjects.iter().any(|subject| subject.model().config().lights > 0);
+        let lit = if lit { " Models with lights in their codes: with an energy weight of 0.35." } else { "" };
+        let lobes = match self.lobes {
+            [] => "",
+            _ => {
+                " With lobes: vectors and lobes on every pixel, with an energy weight of 0.35, lights no wider than 1.5°."
+            }
+        };
         format!(
-            "Optimised: {} from the encoder's latent (from 0 without encoder), solid-angle-weighted log error.",
+            "Optimised: {} from the encoder's latent (from 0 without encoder), solid-angle-weighted log error.{lit}{lobes}",
             fit.describe()
         )
     }

@@ -74,6 +74,7 @@ fn evaluated<T>(
     let (log, store, figures) = (Log::default(), Store::new(folder), folder.join("figures"));
     let (subjects, observer) = (subjects, &log);
     let run = Evaluation {
+        lobes: &[],
         subjects,
         others: &[&Exact],
         data,

@@ -50,6 +50,8 @@ pub enum Method {
 
 /// [`Objective::Energy`]'s weight by default: docs/results/light.md, "The energy weight of a fit".
 const ENERGY_WEIGHT: f64 = 0.05;
+/// The same where the sun is a light of the code: docs/results/light.md, "Lobes in a code".
+const LIT_WEIGHT: f64 = 0.35;
 /// Weight of the prior beside integrals of light: it decides what they leave open, and gives way where they do not.
 const LINEAR_PRIOR: f64 = 1e-6;
 /// Most latent vectors of a small code, which [`Method::Auto`] fits without exploring.
@@ -150,6 +152,11 @@ impl FitConfig {
     /// As [`FitConfig::thorough`], with an eye to where the light comes from: for use.
     pub fn energy() -> Self {
         Self { objective: Objective::Energy { weight: ENERGY_WEIGHT }, ..Self::thorough() }
+    }
+
+    /// As [`FitConfig::energy`] for codes with lights or lobes: with the sun taken out, the light that is left weighs more.
+    pub fn lit() -> Self {
+        Self { objective: Objective::Energy { weight: LIT_WEIGHT }, ..Self::thorough() }
     }
 
     /// For the light on a surface ([`fit_rendered`](super::fit_rendered)), whose loss is not a sum over the light's pixels.

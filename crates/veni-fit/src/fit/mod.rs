@@ -24,7 +24,7 @@ pub use config::{FitConfig, Method, Objective, Plateau};
 pub use decoder::{DecoderPasses, LatentDecoder, LatentGradient, PanoramaLoss};
 pub use linear::{fit_linear, likely_linear};
 pub use linear_target::{Achieved, LinearTarget, Received};
-pub use lobes::{LobePlan, fit_lobes};
+pub use lobes::{LobePlan, WIDEST_LIGHT, fit_lobes};
 pub use rendered::{fit_rendered, matching_exposure};
 pub use starts::{Best, best_light, best_linear, best_of, from_each, random_starts};
 pub use target::FitTarget;

@@ -1,3 +1,5 @@
+use std::f32::consts::PI;
+
 use super::*;
 use veni_image::Panorama;
 use veni_light::model::Model;
@@ -25,26 +27,26 @@ fn a_sun_in_the_known_half_is_taken_out_and_one_in_the_other_half_is_not_seen() 
     let size = [128, 64];
     let picture = |azimuth: f32| Picture::new(size, sunny(azimuth)).unwrap().masked(&half()).unwrap();
     // the right half looks to azimuths below 0
-    let (rest, lights) = seen_lights(&picture(-60.0), 1).unwrap();
+    let (rest, lights) = seen_lights(&picture(-60.0), 1, PI).unwrap();
     let sun = lights.sun().unwrap();
     assert!((sun.azimuth().to_degrees() + 60.0).abs() < 2.0, "{sun:?}");
     assert!((sun.irradiance[1] - 8.0).abs() < 0.4, "{sun:?}");
     let brightest = rest.pixels().iter().flatten().copied().fold(0.0, f32::max);
     assert!(brightest < 2.0 && rest.known() == Some(&half()[..]), "{brightest}");
 
-    let (_, lights) = seen_lights(&picture(60.0), 1).unwrap();
+    let (_, lights) = seen_lights(&picture(60.0), 1, PI).unwrap();
     assert!(lights.is_empty(), "{lights:?}");
     // what is not known may be anything
     let mut pixels = sunny(60.0);
     pixels.iter_mut().zip(half()).filter(|(_, k)| *k == 0.0).for_each(|(p, _)| *p = [f32::NAN; 3]);
-    assert!(seen_lights(&Picture::new(size, pixels).unwrap(), 1).unwrap().1.is_empty());
+    assert!(seen_lights(&Picture::new(size, pixels).unwrap(), 1, PI).unwrap().1.is_empty());
 
-    let whole = seen_lights(&Picture::new(size, sunny(60.0)).unwrap(), 1).unwrap();
+    let whole = seen_lights(&Picture::new(size, sunny(60.0)).unwrap(), 1, PI).unwrap();
     assert!(whole.1.sun().is_some() && whole.0.known().is_none());
     let dark = Picture::new(size, sunny(0.0)).unwrap().masked(&vec![0.0; SKY.len()]).unwrap();
-    assert!(seen_lights(&dark, 1).unwrap_err().to_string().contains("no known pixel"));
+    assert!(seen_lights(&dark, 1, PI).unwrap_err().to_string().contains("no known pixel"));
     let square = Picture::new([2, 2], vec![[1.0; 3]; 4]).unwrap();
-    assert!(seen_lights(&square, 1).unwrap_err().to_string().contains("2 × 2"));
+    assert!(seen_lights(&square, 1, PI).unwrap_err().to_string().contains("2 × 2"));
 }
 
 #[test]

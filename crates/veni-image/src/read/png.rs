@@ -47,7 +47,7 @@ pub(super) fn tags(file: &mut (impl BufRead + Seek)) -> Result<Tags> {
             }
             b"gAMA" => match numbers(&body).first() {
                 Some(0.0) => {
-                    tags.notes.push("its gAMA chunk says 0, which is no exponent: it is ignored".to_owned())
+                    tags.notes.push("its gAMA chunk says 0, which is no exponent: it is ignored".to_owned());
                 }
                 value => tags.gamma = value.map(|v| v / 100_000.0),
             },

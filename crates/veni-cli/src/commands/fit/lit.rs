@@ -1,7 +1,7 @@
 //! A panorama and its compact lights apart.
 
 use clap::{Args, value_parser};
-use veni_fit::{Best, Observation, unseen};
+use veni_fit::{Best, Observation, WIDEST_LIGHT, unseen};
 use veni_image::Picture;
 use veni_light::Result;
 use veni_light::latent::{Latent, Prior};
@@ -16,6 +16,11 @@ pub(super) struct LitArgs {
     #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8), conflicts_with_all = ["fov", "normals"])]
     compact_lights: Option<u8>,
 
+    /// Add K spherical Gaussians to the latent, which fit what its vectors leave of the picture, and the vectors with them: detail
+    /// of 7 numbers each. Lights are then no wider than 1.5°
+    #[arg(long, value_name = "K", default_value_t = 0, hide_default_value = true, value_parser = value_parser!(u16).range(0..=256), conflicts_with = "normals")]
+    lobes: u16,
+
     /// Of a photograph or part of a panorama that does not show the sun: put the sun into the latent that the model thinks most
     /// likely given what is seen, if it thinks that there is one at all
     #[arg(long, conflicts_with = "compact_lights")]
@@ -23,6 +28,16 @@ pub(super) struct LitArgs {
 }
 
 impl LitArgs {
+    /// The number of lobes that are added.
+    pub(super) fn lobes(&self) -> usize {
+        usize::from(self.lobes)
+    }
+
+    /// The angular radius of the widest light, radians.
+    pub(super) fn widest(&self) -> f32 {
+        if self.lobes > 0 { WIDEST_LIGHT } else { std::f32::consts::PI }
+    }
+
     /// The number of lights that are looked for in a picture, where a model was trained without `usual`: none in a photograph
     /// (`view`), nor where values are cut off.
     pub(super) fn most(&self, usual: usize, picture: &Picture, view: bool, report: Report) -> usize {
@@ -82,12 +97,12 @@ pub(super) struct Lit {
 }
 
 impl Lit {
-    /// Up to `most` lights of what is known of a panorama.
-    pub(super) fn new(picture: &Picture, most: usize) -> Result<Self> {
+    /// Up to `most` lights of what is known of a panorama, none wider than `widest`.
+    pub(super) fn new(picture: &Picture, most: usize, widest: f32) -> Result<Self> {
         if most == 0 {
             return Ok(Self { rest: None, lights: Lights::default() });
         }
-        let (rest, lights) = unseen::seen_lights(picture, most)?;
+        let (rest, lights) = unseen::seen_lights(picture, most, widest)?;
         Ok(Self { rest: Some(rest), lights })
     }
 

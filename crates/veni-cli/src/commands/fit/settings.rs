@@ -16,9 +16,10 @@ const LIGHT_PRIOR: f64 = 1e-4;
 
 #[derive(Args, Debug)]
 pub(super) struct Settings {
-    /// What the following options start from
-    #[arg(long, value_enum, default_value_t)]
-    preset: Preset,
+    /// What the following options start from [default: energy with --lobes and for models that were trained without the lights of their
+    /// panoramas, else thorough]
+    #[arg(long, value_enum)]
+    preset: Option<Preset>,
 
     /// What is compared [default: the preset's]
     #[arg(long, value_enum)]
@@ -37,7 +38,8 @@ pub(super) struct Settings {
     rate: Option<(f64, Option<f64>)>,
 
     /// Energy weight of the objective energy, the part of the weight that goes by light, 0 to 1: the more, the better
-    /// suns and lamps and the worse everything else [default: 0.05]
+    /// suns and lamps and the worse everything else [default: 0.35 with --lobes and for models that were trained without the lights of their
+    /// panoramas, else 0.05]
     #[arg(long, value_name = "PART")]
     share: Option<f64>,
 
@@ -77,7 +79,7 @@ enum Preset {
     /// Log radiance, weighted by solid angle, as far down as it goes
     #[default]
     Thorough,
-    /// The same, weighted a little (5 %) by the light that comes from there: the sun stands where it belongs, for light
+    /// The same, weighted partly (--share) by the light that comes from there: the sun stands where it belongs, for light
     /// that is to illuminate something
     Energy,
     /// What is seen on a screen under the picture's own white; highlights beyond it are left alone
@@ -153,15 +155,17 @@ pub(super) enum Start {
 }
 
 impl Settings {
-    /// `light`: for the light on a surface, not for a picture of it.
-    pub(super) fn config(&self, light: bool) -> Result<FitConfig> {
-        let mut config = match self.preset {
+    /// `light`: for the light on a surface, not for a picture of it; `lit`: codes have lights or lobes.
+    pub(super) fn config(&self, light: bool, lit: bool) -> Result<FitConfig> {
+        let preset = self.preset.unwrap_or(if lit { Preset::Energy } else { Preset::Thorough });
+        let energy = if lit { FitConfig::lit() } else { FitConfig::energy() };
+        let mut config = match preset {
             Preset::Thorough | Preset::Display | Preset::Energy if light => {
                 FitConfig { plateau: Some(PLATEAU), ..FitConfig::light() }
             }
             Preset::Thorough => FitConfig { plateau: Some(PLATEAU), ..FitConfig::thorough() },
             Preset::Display => FitConfig { plateau: Some(PLATEAU), ..FitConfig::display() },
-            Preset::Energy => FitConfig { plateau: Some(PLATEAU), ..FitConfig::energy() },
+            Preset::Energy => FitConfig { plateau: Some(PLATEAU), ..energy },
             Preset::Reference => FitConfig::reference_helper(1e-2, 2e-3, 2000),
             #[cfg(feature = "learn")]
             Preset::Renipp => FitConfig::reni_evaluation(),
@@ -172,7 +176,7 @@ impl Settings {
                 ObjectiveName::Log => Objective::LogError,
                 ObjectiveName::Absolute => Objective::LogAbsolute,
                 ObjectiveName::Display => FitConfig::display().objective,
-                ObjectiveName::Energy => FitConfig::energy().objective,
+                ObjectiveName::Energy => energy.objective,
                 ObjectiveName::Reference => Objective::ReferenceLogError,
                 #[cfg(feature = "learn")]
                 ObjectiveName::CosineScale => Objective::CosineScaleInvariant,
@@ -197,6 +201,11 @@ impl Settings {
         }
         config.check()?;
         Ok(config)
+    }
+
+    /// Which preset it is, for what does not depend on lights.
+    fn preset(&self) -> Preset {
+        self.preset.unwrap_or_default()
     }
 
     /// The number of steps, the method and the learning rate.
@@ -240,7 +249,7 @@ impl Settings {
 
     /// What depends on whether part of the sphere is unknown, and on the latent's number of vectors.
     pub(super) fn adapted(&self, config: FitConfig, partial: bool, vectors: usize) -> FitConfig {
-        let prior = match (self.prior, self.preset) {
+        let prior = match (self.prior, self.preset()) {
             (None, Preset::Thorough | Preset::Display | Preset::Energy) if partial => unseen::PRIOR,
             (None, Preset::Thorough | Preset::Display | Preset::Energy) => FitConfig::prior_for(vectors),
             _ => config.prior,
@@ -251,7 +260,7 @@ impl Settings {
 
     /// For the light on a surface, whose loss is a robust one of log radiance.
     pub(super) fn for_light(&self, config: FitConfig) -> FitConfig {
-        let prior = match (self.prior, self.preset) {
+        let prior = match (self.prior, self.preset()) {
             (None, Preset::Thorough | Preset::Display | Preset::Energy) => LIGHT_PRIOR,
             _ => config.prior,
         };
@@ -263,7 +272,7 @@ impl Settings {
     pub(super) fn start(&self, whole: bool, has_encoder: bool) -> (Start, usize) {
         let start = match self.start {
             Some(start) => start,
-            None if whole && has_encoder && self.preset.starts_at_the_encoder() => Start::Encoder,
+            None if whole && has_encoder && self.preset().starts_at_the_encoder() => Start::Encoder,
             None => Start::Zero,
         };
         let default = if whole { 1 } else { unseen::STARTS };

@@ -30,6 +30,10 @@ const ROUNDS: usize = 8;
 /// Updates of a round, at most, but for the last.
 const BETWEEN: u64 = 5;
 
+/// The widest light of a code with lobes, an angular radius in radians: a wider glow is left to lobes, which follow its shape. As a
+/// light it would cover what is before it.
+pub const WIDEST_LIGHT: f32 = 1.5 * std::f32::consts::PI / 180.0;
+
 /// The lobes that a fit adds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LobePlan {

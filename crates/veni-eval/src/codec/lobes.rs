@@ -1,0 +1,133 @@
+//! A model's vectors, one light and lobes, all fitted to each image: codes of more than the model's own dimension.
+
+use serde_json::json;
+
+use super::Codec;
+use super::model::{LIGHT, code, latent};
+use crate::Result;
+use crate::canonical::Canonical;
+use veni_core::LoadedModel;
+use veni_fit::{FitConfig, FitTarget, LobePlan, WIDEST_LIGHT, fit, fit_lobes};
+use veni_light::latent::{Latent, Lobe};
+use veni_light::sphere::Equirect;
+
+/// The parameters of a lobe.
+const LOBE: usize = 7;
+
+/// A code of N vectors, as many lights as the model was trained without, and K lobes: as `veni-cli fit --lobes K` makes it.
+#[derive(Clone, Debug)]
+pub struct Lobed<'a> {
+    subject: &'a LoadedModel,
+    lobes: usize,
+    config: FitConfig,
+    pass: String,
+}
+
+impl<'a> Lobed<'a> {
+    /// With `lobes` lobes; `quick`: at most 20 updates.
+    pub fn new(subject: &'a LoadedModel, lobes: usize, quick: bool) -> Self {
+        let prior = FitConfig::prior_for(subject.latent_vectors());
+        let config = FitConfig { prior, ..FitConfig::lit() };
+        let config = if quick { config.in_steps(20) } else { config };
+        Self { subject, lobes, config, pass: format!("optimised, {lobes} lobes") }
+    }
+}
+
+impl Codec for Lobed<'_> {
+    fn system(&self) -> &str {
+        self.subject.name()
+    }
+
+    fn pass(&self) -> &str {
+        &self.pass
+    }
+
+    fn dimension(&self) -> usize {
+        self.subject.dimension() + LIGHT * self.subject.model().config().lights + LOBE * self.lobes
+    }
+
+    fn key(&self) -> Canonical {
+        Canonical::of(json!({
+            "model": self.subject.identity(),
+            "pass": "lobes",
+            "lobes": self.lobes,
+            "widest": WIDEST_LIGHT,
+            "fit": self.config,
+        }))
+    }
+
+    fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
+        let rest = self.subject.without_lights_up_to(grid, image, WIDEST_LIGHT)?;
+        let images = [&*rest.log_radiance];
+        let vectors = match self.subject.veni() {
+            Some(_) => self.subject.encode_rest(grid, &images)?.remove(0),
+            None => vec![[0.0; 3]; self.subject.latent_vectors()],
+        };
+        let prior = self.subject.prior();
+        let target = FitTarget::panoramas(grid, &images)?.with_prior(&prior);
+        let (decoder, start) = (self.subject.fit_decoder().as_dyn(), [Latent::new(vectors)]);
+        let begun = fit(decoder, &target, &start, &self.config)?.latents;
+        let plan = LobePlan { count: self.lobes, only_lobes: false };
+        let found = fit_lobes(decoder, &target, &begun, plan, &self.config, &mut |_, _| {})?;
+        let mut all: Vec<f32> = vec![rest.code.lights.len() as f32];
+        for (fitted, _) in found {
+            let z = Latent {
+                lights: rest.code.lights.scaled((-fitted.log_exposure).exp()),
+                log_exposure: fitted.log_exposure + rest.code.log_exposure,
+                ..fitted
+            };
+            all.extend(code(&z));
+            for Lobe { direction, amplitude, sharpness } in z.lobes {
+                all.extend(direction.into_iter().chain(amplitude).chain([sharpness]));
+            }
+        }
+        Ok(all)
+    }
+
+    fn decode(&self, grid: Equirect, values: &[f32]) -> Result<Vec<f32>> {
+        let lights = values.first().map_or(0, |count| *count as usize);
+        let (plain, lobes) = values[1..].split_at(3 * self.subject.latent_vectors() + 2 + LIGHT * lights);
+        let lobe = |n: &[f32; LOBE]| Lobe {
+            direction: [n[0], n[1], n[2]],
+            amplitude: [n[3], n[4], n[5]],
+            sharpness: n[6],
+        };
+        let lobes = lobes.as_chunks().0.iter().map(lobe).collect();
+        Ok(self.subject.decode(grid, &[Latent { lobes, ..latent(self.subject, plain) }])?.concat())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use veni_core::train::config::DeviceKind;
+    use veni_light::model::Model;
+
+    #[test]
+    fn a_code_is_decoded_and_more_lobes_are_nearer() {
+        let grid = Equirect::new(32, 16);
+        // an even sky with a dark tower and a bright window
+        let at = |d: &[f32; 3]| {
+            let near = |u: [f32; 3]| d.iter().zip(u).map(|(a, b)| a * b).sum::<f32>();
+            let tower = if near([0.0, 1.0, 0.0]) > 0.95 { -3.0 } else { 0.0 };
+            let window = if near([0.6, -0.6, 0.53]) > 0.97 { 2.0 } else { 0.0 };
+            [d[2] + tower, d[2] + tower + window, 1.2 * d[2] + tower]
+        };
+        let image: Vec<f32> = grid.directions().iter().flat_map(at).collect();
+        let device = DeviceKind::Flex.device().unwrap();
+        let subject = LoadedModel::new("27", Model::pretrained(), &device).unwrap();
+        let error = |lobes: usize| {
+            let codec = Lobed::new(&subject, lobes, true);
+            let code = codec.encode(grid, &image).unwrap();
+            let own = codec.dimension() - LIGHT * subject.model().config().lights;
+            // the count of lights, exposure and sun beside what counts
+            assert!(code.len() >= own + 3, "{} of {own}", code.len());
+            let decoded = codec.decode(grid, &code).unwrap();
+            let squares: f32 = decoded.iter().zip(&image).map(|(a, b)| (a - b) * (a - b)).sum();
+            f64::from(squares) / image.len() as f64
+        };
+        let [none, some, many] = [0, 4, 12].map(error);
+        assert!(some < 0.8 * none && many < some, "{none}, {some} and {many}");
+        assert_ne!(Lobed::new(&subject, 4, true).key(), Lobed::new(&subject, 5, true).key());
+    }
+}
