@@ -130,6 +130,7 @@ mod tests {
             }
         }
     }
+
     #[test]
     fn what_may_be_a_dash_is_an_argument() {
         let mut cli = Cli::command();
