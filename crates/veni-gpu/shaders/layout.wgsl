@@ -43,7 +43,7 @@ fn veni_output(channel: u32) -> u32 {
 }
 
 const VENI_MAX_LIGHTS: u32 = 8u;
-const VENI_MAX_LOBES: u32 = 16u;
+const VENI_MAX_LOBES: u32 = 64u;
 
 fn veni_latent(index: u32) -> u32 {
     return index * (veni_latent_lobes(0u) + 2u * VENI_MAX_LOBES);

@@ -57,7 +57,7 @@ impl GpuDecoder {
     /// Folds a latent on the CPU (microseconds) and uploads it: a few kilobytes.
     ///
     /// # Errors
-    /// [`Error::Light`] if the latent does not fit the model, is not finite, or has more than 8 lights or 16 lobes; [`Error::Gpu`] if
+    /// [`Error::Light`] if the latent does not fit the model, is not finite, or has more than 8 lights or 64 lobes; [`Error::Gpu`] if
     /// there is no memory.
     pub fn condition(&self, queue: &Queue, latent: &Latent) -> Result<GpuLatents> {
         self.condition_batch(queue, std::slice::from_ref(latent))

@@ -5,7 +5,7 @@ use veni_light::model::ModelConfig;
 use super::MAX_LIGHTS;
 
 /// Most lobes of a latent.
-pub const MAX_LOBES: usize = 16;
+pub const MAX_LOBES: usize = 64;
 
 /// Sizes of a decoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
