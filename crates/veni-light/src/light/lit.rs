@@ -259,9 +259,8 @@ impl Light {
         let [x, y, z] = normal.map(f64::from);
         // the cells are as they were before the rotation
         let rotated = [cos * x + sin * y, cos * y - sin * x, z];
-        let view = self.coarse.kept();
         let mut sum = [0.0; 3];
-        for cell in (0..view.cells().len()).map(|index| view.cell(index)) {
+        for cell in self.coarse.kept().all() {
             let cosine: f64 = cell.direction.iter().zip(rotated).map(|(d, n)| d * n).sum();
             let weight = cell.solid_angle * cosine.max(0.0);
             sum = [0, 1, 2].map(|c| sum[c] + weight * f64::from(cell.radiance[c]));

@@ -1,6 +1,9 @@
 use super::*;
+#[cfg(feature = "pretrained")]
 use crate::light::EnvironmentMap;
+#[cfg(feature = "pretrained")]
 use crate::model::Model;
+#[cfg(feature = "pretrained")]
 use crate::sphere::Equirect;
 
 /// The model inside this crate with suns that follow its vectors.

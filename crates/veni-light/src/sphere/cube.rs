@@ -88,6 +88,32 @@ impl CubeFace {
         let (i, j) = (column, row);
         corner(i + 1, j + 1) - corner(i, j + 1) - corner(i + 1, j) + corner(i, j)
     }
+    /// The solid angle of every texel of a face, row-major. A quarter of the face is its mirror images, and half of that again.
+    pub(crate) fn solid_angles(size: usize) -> Vec<f64> {
+        let half = size.div_ceil(2);
+        let mut corners = vec![0.0; (half + 1) * (half + 1)];
+        for j in 0..=half {
+            for i in 0..=j {
+                let (a, b) = (2.0 * i as f64 / size as f64 - 1.0, 2.0 * j as f64 / size as f64 - 1.0);
+                let corner = (a * b).atan2((a * a + b * b + 1.0).sqrt());
+                corners[j * (half + 1) + i] = corner;
+                corners[i * (half + 1) + j] = corner;
+            }
+        }
+        let mut areas = vec![0.0; size * size];
+        for j in 0..half {
+            for i in 0..half {
+                let corner = |i: usize, j: usize| corners[j * (half + 1) + i];
+                let area = corner(i + 1, j + 1) - corner(i, j + 1) - corner(i + 1, j) + corner(i, j);
+                for row in [j, size - 1 - j] {
+                    for column in [i, size - 1 - i] {
+                        areas[row * size + column] = area;
+                    }
+                }
+            }
+        }
+        areas
+    }
 }
 
 #[cfg(test)]
@@ -156,5 +182,16 @@ mod tests {
         let d = CubeFace::PosZ.direction(Frame::Bevy, 3, 2, 1);
         let [x, y, z] = Frame::Bevy.from_native(d);
         assert!(x > 0.0 && y.abs() < 1e-6 && z < 0.0);
+    }
+    #[test]
+    fn solid_angles_of_a_face_are_those_of_its_texels() {
+        for size in [1, 2, 3, 8, 17] {
+            for (k, area) in CubeFace::solid_angles(size).into_iter().enumerate() {
+                assert!(
+                    (area - CubeFace::solid_angle(size, k % size, k / size)).abs() < 1e-14,
+                    "{size}: {k}"
+                );
+            }
+        }
     }
 }

@@ -184,9 +184,22 @@ impl<'a> View<'a> {
     }
 
     pub(in crate::light) fn cell(self, index: usize) -> Cell {
+        self.at(index / self.level.width, index % self.level.width)
+    }
+
+    /// Every cell, row-major.
+    pub(in crate::light) fn all(self) -> impl Iterator<Item = Cell> + use<'a> {
+        let columns = 0..self.level.width;
+        (0..self.level.rows.len())
+            .flat_map(move |row| columns.clone().map(move |column| self.at(row, column)))
+    }
+
+    #[inline]
+    fn at(self, row: usize, column: usize) -> Cell {
         let Level { grid, k, width, rows, columns, .. } = self.level;
-        let (row, (sin, cos)) = (rows[index / width], columns[index % width]);
-        let across = ((index % width + 1) * k).min(grid.width) - index % width * k;
+        let index = row * width + column;
+        let (row, (sin, cos)) = (rows[row], columns[column]);
+        let across = ((column + 1) * k).min(grid.width) - column * k;
         Cell {
             direction: [row.sin * cos, row.sin * sin, row.cos],
             solid_angle: row.solid_angle * across as f64,
@@ -202,7 +215,7 @@ impl<'a> View<'a> {
             let (first, count) = self.level.cap_columns(row, centre, radius);
             let mut column = first.rem_euclid(width as isize) as usize;
             for _ in 0..count {
-                each(self.cell(row * width + column));
+                each(self.at(row, column));
                 column = if column + 1 == width { 0 } else { column + 1 };
             }
         }

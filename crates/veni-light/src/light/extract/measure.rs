@@ -95,16 +95,24 @@ fn ring(view: View<'_>, centre: [f64; 3], radius: f64) -> [f32; 3] {
     values.map(|values| quantile(values, 0.5))
 }
 
-/// The value below which a part of the weight lies; 0 of nothing.
+/// The value below which a part of the weight lies; 0 of nothing. Of the two halves only the one that holds it is looked at again.
 pub(super) fn quantile(mut values: Vec<(f32, f64)>, part: f64) -> f32 {
-    values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let below = part * values.iter().map(|v| v.1).sum::<f64>();
-    let mut sum = 0.0;
-    let at = values.iter().find(|(_, weight)| {
-        sum += weight;
-        sum >= below
-    });
-    at.map_or(0.0, |v| v.0)
+    let mut below = part * values.iter().map(|v| v.1).sum::<f64>();
+    let mut rest = values.as_mut_slice();
+    while rest.len() > 1 {
+        let half = rest.len() / 2;
+        let (lower, middle, upper) = rest.select_nth_unstable_by(half, |a, b| a.0.total_cmp(&b.0));
+        let weight: f64 = lower.iter().map(|v| v.1).sum();
+        if weight >= below {
+            rest = lower;
+        } else if weight + middle.1 >= below || upper.is_empty() {
+            return middle.0;
+        } else {
+            below -= weight + middle.1;
+            rest = upper;
+        }
+    }
+    rest.first().map_or(0.0, |v| v.0)
 }
 
 /// A light's own middle, within its core: the centroid of what exceeds the median of a ring of two cells about the core. It
@@ -160,4 +168,34 @@ pub(super) fn core_centre(view: View<'_>, measured: &Measured) -> Option<([f64; 
 /// Luminance of an integral.
 pub(super) fn luminance_of(energy: [f64; 3]) -> f64 {
     energy.iter().zip(LUMINANCE).map(|(e, w)| e * f64::from(w)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quantile_is_where_the_sorted_weights_reach_its_part() {
+        let mut state = 7u64;
+        let mut number = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 40) as f64 / (1u64 << 24) as f64
+        };
+        for n in [1, 2, 3, 10, 101, 5000] {
+            // values repeat, weights differ
+            let values: Vec<_> = (0..n).map(|_| ((30.0 * number()).floor() as f32, 0.5 + number())).collect();
+            let mut sorted = values.clone();
+            sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let total: f64 = values.iter().map(|v| v.1).sum();
+            for part in [0.1, 0.5, 0.9, 0.98] {
+                let mut sum = 0.0;
+                let expected = sorted.iter().find(|v| {
+                    sum += v.1;
+                    sum >= part * total
+                });
+                assert_eq!(quantile(values.clone(), part), expected.unwrap().0, "{part} of {n}");
+            }
+        }
+        assert_eq!(quantile(Vec::new(), 0.5), 0.0);
+    }
 }

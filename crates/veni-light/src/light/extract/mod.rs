@@ -313,9 +313,8 @@ impl Extraction {
 
     /// Irradiance (luminance) of a surface that faces `direction`.
     fn facing(&self, direction: [f64; 3]) -> f64 {
-        let view = self.coarsest();
-        let cells = (0..view.cells().len()).map(|index| view.cell(index));
-        cells
+        self.coarsest()
+            .all()
             .map(|cell| {
                 let cosine = dot(cell.direction, direction).max(0.0);
                 cell.solid_angle * cosine * f64::from(luminance(cell.radiance))

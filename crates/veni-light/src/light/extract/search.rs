@@ -91,21 +91,34 @@ impl Sums {
             return None;
         }
         let share = inner_area / (outer_area - inner_area);
-        let sum = |spans: &[(usize, usize, usize, f64)], shift: usize| {
-            spans
-                .iter()
-                .map(|&(at, start, count, area)| {
-                    let start = (start + shift) % self.width;
-                    area * (self.running[at + start + count] - self.running[at + start])
-                })
-                .sum::<f64>()
-        };
-        let excess = |column: usize| {
-            let cap = sum(&inner, column);
-            cap - share * (sum(&outer, column) - cap)
-        };
-        let best = (0..self.width).map(|column| (excess(column), column));
+        let (cap, outer) = (self.sums(&inner), self.sums(&outer));
+        let best = cap.iter().zip(&outer).map(|(cap, outer)| cap - share * (outer - cap));
+        let best = best.zip(0..);
         let best = best.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
         (best.0 > 0.0).then_some((best.0, row * self.width + best.1))
+    }
+
+    /// The sum over these spans, shifted by every column of a row: span by span, so that neighbouring columns read neighbouring
+    /// numbers.
+    fn sums(&self, spans: &[(usize, usize, usize, f64)]) -> Vec<f64> {
+        let mut sums = vec![0.0; self.width];
+        pulp::Arch::new().dispatch(|| {
+            for &(at, start, count, area) in spans {
+                let row = &self.running[at..=at + 2 * self.width];
+                // beyond the last column it begins again at the first
+                let (before, beyond) = sums.split_at_mut(self.width - start);
+                add_differences(before, &row[start..], count, area);
+                add_differences(beyond, row, count, area);
+            }
+        });
+        sums
+    }
+}
+
+/// Adds the sum of `count` cells from each place on, times `area`.
+#[inline(always)]
+fn add_differences(sums: &mut [f64], running: &[f64], count: usize, area: f64) {
+    for ((sum, to), from) in sums.iter_mut().zip(&running[count..]).zip(running) {
+        *sum += area * (to - from);
     }
 }

@@ -41,7 +41,7 @@ impl Surroundings {
     fn new(view: View<'_>) -> Self {
         let (mut high, mut upper) = (Vec::new(), Vec::new());
         let (mut ground, mut area) = (0.0, 0.0);
-        for cell in (0..view.cells().len()).map(|index| view.cell(index)) {
+        for cell in view.all() {
             let y = luminance(cell.radiance);
             if cell.direction[2] > 0.0 {
                 upper.push((y, cell.solid_angle));

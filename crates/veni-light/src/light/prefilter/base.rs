@@ -6,11 +6,11 @@
 
 use std::f64::consts::PI;
 
+use super::unfold::Dim;
 use super::{CubeAxes, CubeMap};
 use crate::light::EnvironmentMap;
-use crate::light::angle::pixel;
 use crate::light::reduce::Reduced;
-use crate::sphere::{CubeFace, Equirect};
+use crate::sphere::CubeFace;
 
 /// Radiance above this many times the mean is handed on by energy.
 const BRIGHT: f64 = 16.0;
@@ -28,8 +28,7 @@ impl CubeMap {
         let grid = dim.grid();
         // a texel in the middle of a face spans 2/size rad, a pixel 2π/W
         let samples = (grid.width as f64 / (PI * size as f64) * 1.5).ceil().clamp(1.0, 16.0) as usize;
-        let mut cube =
-            Self::of(size, axes, samples, |direction| bilinear(grid, dim.pixels(), &ceiling, direction));
+        let mut cube = Self::unfolded(Dim { grid, pixels: dim.pixels(), ceiling }, size, axes, samples);
         cube.add_bright(map, ceiling, axes);
         cube.scale_to(map.integral());
         cube
@@ -68,37 +67,10 @@ impl CubeMap {
     }
 }
 
-/// Radiance between four pixels, none above the ceiling: columns wrap, rows go on beyond a pole half a turn away.
-#[inline]
-fn bilinear(grid: Equirect, pixels: &[[f32; 3]], ceiling: &[f32; 3], direction: [f32; 3]) -> [f32; 3] {
-    let Equirect { width, height } = grid;
-    let [x, y] = pixel(grid, direction).map(|v| v - 0.5);
-    let (left, top) = (x.floor(), y.floor());
-    let (u, v) = (x - left, y - top);
-    let mut sum = [0.0; 3];
-    for (j, down) in [(top as isize, 1.0 - v), (top as isize + 1, v)] {
-        let (row, turn) = if j < 0 {
-            (0, width / 2)
-        } else if j as usize >= height {
-            (height - 1, width / 2)
-        } else {
-            (j as usize, 0)
-        };
-        for (i, across) in [(left as isize, 1.0 - u), (left as isize + 1, u)] {
-            let mut column = (i + width as isize) as usize + turn;
-            while column >= width {
-                column -= width;
-            }
-            let (pixel, weight) = (pixels[row * width + column], down * across);
-            sum = [0, 1, 2].map(|c| sum[c] + weight * pixel[c].min(ceiling[c]));
-        }
-    }
-    sum
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sphere::Equirect;
 
     /// Energy of skies with a sun of a pixel or a few, wherever it stands.
     #[test]

@@ -44,9 +44,7 @@ impl CubeMap {
 
     /// The integral of radiance over the sphere.
     pub fn integral(&self) -> [f64; 3] {
-        let areas: Vec<f64> = (0..self.size * self.size)
-            .map(|k| CubeFace::solid_angle(self.size, k % self.size, k / self.size))
-            .collect();
+        let areas = CubeFace::solid_angles(self.size);
         self.texels.chunks_exact(areas.len()).fold([0.0; 3], |sum, face| {
             face.iter()
                 .zip(&areas)

@@ -12,6 +12,7 @@ mod disc;
 mod glint;
 mod law;
 mod lobe;
+mod unfold;
 
 pub use axes::CubeAxes;
 pub use cube::CubeMap;
