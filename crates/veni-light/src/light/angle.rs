@@ -72,6 +72,7 @@ mod tests {
         }
         assert_eq!([atan2(0.0, 0.0), atan2(0.0, 1.0), atan2(0.0, -1.0)], [0.0, 0.0, PI]);
     }
+
     #[test]
     fn polar_angles_are_those_of_the_standard_library() {
         for k in 0..=200_000 {

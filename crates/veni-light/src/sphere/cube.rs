@@ -88,6 +88,7 @@ impl CubeFace {
         let (i, j) = (column, row);
         corner(i + 1, j + 1) - corner(i, j + 1) - corner(i + 1, j) + corner(i, j)
     }
+
     /// The solid angle of every texel of a face, row-major. A quarter of the face is its mirror images, and half of that again.
     pub(crate) fn solid_angles(size: usize) -> Vec<f64> {
         let half = size.div_ceil(2);
@@ -183,6 +184,7 @@ mod tests {
         let [x, y, z] = Frame::Bevy.from_native(d);
         assert!(x > 0.0 && y.abs() < 1e-6 && z < 0.0);
     }
+
     #[test]
     fn solid_angles_of_a_face_are_those_of_its_texels() {
         for size in [1, 2, 3, 8, 17] {
