@@ -128,3 +128,34 @@ fn damaged_lights_are_refused_by_name() {
         dir.refused(&["bake", "bad.json", "-o", "x.exr"], &[says, "bad.json"]);
     }
 }
+
+#[test]
+fn lobes_bring_detail_to_codes_that_are_encoded_and_fitted() {
+    let dir = Dir::new();
+    let file = text(&panoramas().join("val/kloppenheim_05.exr"));
+    let score = |command: &str, lobes: &str| -> f64 {
+        let out = format!("{command}-{lobes}.json");
+        let [said] = &dir.json(&[command, &file, "--lobes", lobes, "-o", &out])[..] else { panic!("one") };
+        said["ldr_psnr"].as_f64().unwrap()
+    };
+    let [plain, encoded] = ["0", "6"].map(|lobes| score("encode", lobes));
+    let fitted = score("fit", "6");
+    assert!(encoded > plain + 1.0, "{encoded} and {plain} dB");
+    assert!(fitted > encoded, "{fitted} and {encoded} dB");
+    // the encoder's vectors stay, those of a fit move with the lobes
+    let [plain, encoded, fitted] = ["encode-0", "encode-6", "fit-6"]
+        .map(|name| Latent::load(dir.path(&format!("{name}.json"))).unwrap());
+    assert_eq!(plain.lobes.len() + encoded.lobes.len() + fitted.lobes.len(), 12);
+    assert_eq!(plain.vectors, encoded.vectors);
+    assert_ne!(plain.vectors, fitted.vectors);
+    assert_eq!(fitted.dimension(), 27 + 7 + 6 * 7);
+    let said = dir.ok(&["inspect", "fit-6.json"]);
+    assert!(said.contains("D = 76"), "{said}");
+    // what is baked is what was scored, and gives the code back
+    dir.ok(&["bake", "fit-6.json", "-o", "fit.exr", "--float", "--size", "128"]);
+    dir.ok(&["bake", "fit.exr", "-o", "again.exr", "--float", "--size", "128"]);
+    let [once, again] = ["fit.exr", "again.exr"].map(|name| sums(&dir.path(name)));
+    assert!(close(once, again, 1e-6));
+    let run = dir.run(&["fit", &file, "--lobes", "257", "-o", "x.json"]);
+    assert!(run.code == Some(2) && run.err.contains("257"), "{}", run.err);
+}

@@ -1,5 +1,5 @@
 //! Lobes for what the vectors of a code leave: placed one after the other on the residual, then fitted with the vectors.
-//! MODEL (77), MODEL (78).
+//! MODEL (82), MODEL (83).
 //!
 //! A code of N vectors and K lobes is searched in rounds. In each some lobes are placed by matching pursuit
 //! ([`pursuit`]), then Levenberg–Marquardt moves everything at once: vectors, amplitudes, sharpnesses and directions.

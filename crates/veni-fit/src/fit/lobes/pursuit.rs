@@ -1,5 +1,5 @@
 //! Orthogonal matching pursuit (Pati et al. 1993): lobe after lobe, each the one out of a dictionary that lowers the loss most,
-//! with the best amplitudes of all that were placed. MODEL (78).
+//! with the best amplitudes of all that were placed. MODEL (83).
 
 use veni_light::cholesky;
 use veni_light::field::LocalQuadratic;

@@ -1,4 +1,4 @@
-//! The lobes' rows of the Jacobian of log radiance: closed forms, block by block. MODEL (77).
+//! The lobes' rows of the Jacobian of log radiance: closed forms, block by block. MODEL (82).
 
 use pulp::Simd;
 
