@@ -62,7 +62,7 @@ fn a_photograph_sees_what_the_panorama_has_there() {
     let pixels: Vec<_> = directions.into_iter().map(light).collect();
     let seen = Observation::photograph(&whole(&pixels, [90, 60]).clipped_at(2.9), &view, 45).unwrap();
     assert_eq!((seen.grid.width, seen.grid.height), (45, 30));
-    let (directions, areas) = seen.view.as_ref().unwrap();
+    let Perspective { directions, areas, .. } = seen.perspective.as_ref().unwrap();
     let covered = areas.iter().sum::<f32>() / (4.0 * PI as f32);
     assert!((seen.share() - covered).abs() < 1e-6);
     let clipped = seen.clipped.as_ref().unwrap();
