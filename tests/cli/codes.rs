@@ -143,8 +143,8 @@ fn lobes_bring_detail_to_codes_that_are_encoded_and_fitted() {
     assert!(encoded > plain + 1.0, "{encoded} and {plain} dB");
     assert!(fitted > encoded, "{fitted} and {encoded} dB");
     // the encoder's vectors stay, those of a fit move with the lobes
-    let [plain, encoded, fitted] = ["encode-0", "encode-6", "fit-6"]
-        .map(|name| Latent::load(dir.path(&format!("{name}.json"))).unwrap());
+    let [plain, encoded, fitted] =
+        ["encode-0", "encode-6", "fit-6"].map(|name| Latent::load(dir.path(format!("{name}.json"))).unwrap());
     assert_eq!(plain.lobes.len() + encoded.lobes.len() + fitted.lobes.len(), 12);
     assert_eq!(plain.vectors, encoded.vectors);
     assert_ne!(plain.vectors, fitted.vectors);

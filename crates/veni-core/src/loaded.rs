@@ -8,6 +8,7 @@ use burn::tensor::Device;
 use crate::fit::FitDecoder;
 use crate::vae::{Decoder, Veni, veni};
 use crate::{Error, Result};
+use veni_fit::lit_exposure;
 use veni_light::field;
 use veni_light::latent::{Latent, Prior};
 use veni_light::light::LightOptions;
@@ -144,8 +145,8 @@ impl LoadedModel {
         self.veni().map(Veni::stripes).transpose()
     }
 
-    /// The means of the encoder's posteriors for images of log radiance at exposure 0; with the lights of each image, where the
-    /// model's codes have some.
+    /// The means of the encoder's posteriors for images of log radiance at exposure 0. Where the model's codes have lights, with those
+    /// of each image, and at the exposure at which surfaces get its light ([`lit_exposure`]).
     ///
     /// # Errors
     /// [`Error::Invalid`] if there is no encoder; otherwise as [`Veni::encode`].
@@ -154,8 +155,17 @@ impl LoadedModel {
             images.iter().map(|image| self.without_lights(grid, image)).collect::<Result<Vec<_>>>()?;
         let views: Vec<_> = rests.iter().map(|rest| &*rest.log_radiance).collect();
         let vectors = self.encode_rest(grid, &views)?;
-        let whole = rests.iter().zip(vectors);
-        Ok(whole.map(|(rest, vectors)| Latent { vectors, ..rest.code.clone() }).collect())
+        let plain: Vec<_> = vectors.into_iter().map(Latent::new).collect();
+        if self.model.config().lights == 0 {
+            return Ok(plain);
+        }
+        let decoded = self.decode(grid, &plain)?;
+        let whole = |((rest, decoded), plain): ((&Rest<'_>, Vec<f32>), Latent)| {
+            let change = lit_exposure(grid, &rest.log_radiance, &decoded, &rest.code.lights);
+            let lights = rest.code.lights.scaled((-change).exp());
+            Latent { lights, log_exposure: rest.code.log_exposure + change, ..plain }
+        };
+        Ok(rests.iter().zip(decoded).zip(plain).map(whole).collect())
     }
 
     /// The vectors of the encoder's posteriors' means for images whose lights are out ([`LoadedModel::without_lights`]).

@@ -23,6 +23,7 @@
 #![forbid(unsafe_code)]
 
 mod adam;
+mod calibration;
 pub mod encoder;
 mod fit;
 pub mod limits;
@@ -34,6 +35,7 @@ pub mod targets;
 pub mod unseen;
 
 pub use adam::Adam;
+pub use calibration::lit_exposure;
 pub use encoder::{Encoded, Encoder};
 pub use fit::{
     Achieved, Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient,

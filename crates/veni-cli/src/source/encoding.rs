@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use veni_data::Item;
-use veni_fit::{Encoder, FitConfig, FitTarget, LobePlan, WIDEST_LIGHT, fit_lobes};
+use veni_fit::{Encoder, FitConfig, FitTarget, LobePlan, WIDEST_LIGHT, fit_lobes, lit_exposure};
 use veni_image::Panorama;
 use veni_image::metrics::{Alignment, Scores, scores};
 use veni_light::field::{Decoder, Field};
@@ -70,11 +70,22 @@ impl<'a> Encoding<'a> {
         let vectors = encoded.into_iter().next().map(|e| e.vectors).unwrap_or_default();
         let decoder = self.loaded.model.decoder().map_err(|e| e.in_file(&self.loaded.name))?;
         let lobes = self.lobes(&decoder, grid, &item.log_radiance, &vectors).map_err(|e| e.in_file(path))?;
+        // of a panorama whose lights are apart
+        let change = match self.lights {
+            0 => 0.0,
+            _ => {
+                let rest = Latent { vectors: vectors.clone(), lobes: lobes.clone(), ..Latent::default() };
+                let mut decoded = vec![[0.0; 3]; grid.len()];
+                let field = decoder.condition(&rest).map_err(|e| e.in_file(path))?;
+                field.log_radiance_batch(&grid.directions(), &mut decoded);
+                lit_exposure(grid, &item.log_radiance, decoded.as_flattened(), &item.lights)
+            }
+        };
         let latent = Latent {
             vectors,
             lobes,
-            lights: item.lights,
-            log_exposure: item.log_exposure,
+            lights: item.lights.scaled((-change).exp()),
+            log_exposure: item.log_exposure + change,
             model: Some(self.loaded.model.hash()),
             source: Some(source_of(path)),
         };

@@ -64,7 +64,12 @@ impl Codec for Autoencoder<'_> {
     }
 
     fn key(&self) -> Canonical {
-        Canonical::of(json!({ "model": self.subject.identity(), "pass": "autoencoder" }))
+        let mut key = json!({ "model": self.subject.identity(), "pass": "autoencoder" });
+        if self.subject.model().config().lights > 0 {
+            // codes with lights were at another exposure before
+            key["exposure"] = json!("surfaces");
+        }
+        Canonical::of(key)
     }
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {

@@ -158,8 +158,7 @@ impl CubeMap {
         let turns: Vec<f32> = places.distances().map(|a| places.scale[0] * atan2(a, 1.0)).collect();
         let lies = CubeFace::ALL.map(|face| Lie::new(face, axes));
         // rows above and below the middle of a face share their angles
-        let mut pairs: Vec<Vec<(usize, &mut [[f32; 3]])>> =
-            (0..size.div_ceil(2)).map(|_| Vec::new()).collect();
+        let mut pairs: Vec<Vec<Line<'_>>> = (0..size.div_ceil(2)).map(|_| Vec::new()).collect();
         for (line, texels) in texels.chunks_exact_mut(size).enumerate() {
             pairs[(line % size).min(size - 1 - line % size)].push((line, texels));
         }
@@ -186,6 +185,9 @@ impl CubeMap {
         Self::new(size, texels)
     }
 }
+
+/// A row of texels: its number in the cube, and the texels.
+type Line<'a> = (usize, &'a mut [[f32; 3]]);
 
 /// A row of places on one face.
 struct FaceRow<'a> {
