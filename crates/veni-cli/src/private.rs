@@ -25,7 +25,14 @@ impl PrivateFolder {
     /// A new, empty one, which nobody else may look into.
     pub(crate) fn new() -> Result<Self> {
         loop {
-            let made = tempfile::Builder::new().prefix(PREFIX).suffix(SUFFIX).tempdir();
+            let mut builder = tempfile::Builder::new();
+            builder.prefix(PREFIX).suffix(SUFFIX);
+            #[cfg(unix)]
+            {
+                use std::os::unix::fs::PermissionsExt;
+                builder.permissions(fs::Permissions::from_mode(0o700));
+            }
+            let made = builder.tempdir();
             let failed = |e| Error::io(std::env::temp_dir(), "create a file in", e);
             let path = made.map_err(failed)?.keep();
             remember(&path);

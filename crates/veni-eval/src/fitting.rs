@@ -89,7 +89,8 @@ impl FitSettings {
 /// How a latent is fitted to what shows part of the sphere: as `veni-cli fit --likely-sun` does it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnseenSettings {
-    config: FitConfig,
+    /// At most 100 steps.
+    quick: bool,
     /// Of the starts.
     seed: u64,
 }
@@ -97,15 +98,19 @@ pub struct UnseenSettings {
 impl UnseenSettings {
     /// [`unseen::config`]; `quick`: at most 100 steps.
     pub fn new(seed: u64, quick: bool) -> Self {
-        let config = unseen::config();
-        Self { config: if quick { config.in_steps(100) } else { config }, seed }
+        Self { quick, seed }
+    }
+
+    fn config(&self, known: f32) -> FitConfig {
+        let config = unseen::config(known);
+        if self.quick { config.in_steps(100) } else { config }
     }
 
     /// Everything that decides a result, beside model and picture.
     pub fn key(&self) -> Canonical {
         let grid = [unseen::GRID.width, unseen::GRID.height, unseen::LONGEST];
         Canonical::of(
-            json!({ "config": self.config, "seed": self.seed, "starts": unseen::STARTS, "sizes": grid }),
+            json!({ "config": self.config(1.0), "seed": self.seed, "starts": unseen::STARTS, "sizes": grid }),
         )
     }
 
@@ -126,8 +131,9 @@ impl UnseenSettings {
         };
         let prior = subject.prior();
         let (target, starts) = (observation.target().with_prior(&prior), unseen::starts(&prior, self.seed));
+        let config = self.config(observation.share());
         let mut latent =
-            fit::best_of(subject.fit_decoder(), &target, &starts, &self.config, &mut |_, _| {})?.latent;
+            fit::best_of(subject.fit_decoder(), &target, &starts, &config, &mut |_, _| {})?.latent;
         latent.log_exposure += observation.log_exposure();
         latent.lights = lights.scaled((-latent.log_exposure).exp());
         if latent.lights.sun().is_none() {

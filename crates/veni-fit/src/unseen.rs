@@ -13,8 +13,8 @@ use crate::{Error, FitConfig, Observation, Plateau, Result, random_starts};
 
 /// Starts: enough to see where they disagree.
 pub const STARTS: usize = 4;
-/// Weight of the prior.
-pub const PRIOR: f64 = 0.02;
+/// Weight of the prior where all but this part of the sphere is unknown.
+const PRIOR: f64 = 0.01;
 /// Where part of a panorama is fitted.
 pub const GRID: Equirect = Equirect { width: 64, height: 32 };
 /// Longest side at which a photograph is fitted, in pixels.
@@ -22,9 +22,20 @@ pub const LONGEST: usize = 96;
 /// A plateau: N steps in which the loss falls by less than this fraction.
 pub const PLATEAU: Plateau = Plateau { patience: 50, improvement: 1e-3 };
 
-/// How the latent is found.
-pub fn config() -> FitConfig {
-    FitConfig { prior: PRIOR, free_exposure: true, plateau: Some(PLATEAU), ..FitConfig::thorough() }
+/// Weight of the prior where `share` of the sphere is known: the less, the fewer independent errors speak against it. The loss is
+/// their mean, so that the weight falls with their number: 0.02 for half, 0.14 for a photograph of 65°.
+pub fn prior_weight(share: f32) -> f64 {
+    PRIOR / f64::from(share).clamp(PRIOR, 1.0)
+}
+
+/// How the latent is found where `share` of the sphere is known.
+pub fn config(share: f32) -> FitConfig {
+    FitConfig {
+        prior: prior_weight(share),
+        free_exposure: true,
+        plateau: Some(PLATEAU),
+        ..FitConfig::thorough()
+    }
 }
 
 /// Latent 0 and [`STARTS`] − 1 draws of the prior.

@@ -16,7 +16,7 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
-use veni_fit::{Best, FitConfig, FitTarget, LobePlan, Observation, best_light, fit_lobes, random_starts};
+use veni_fit::{Best, FitConfig, Observation, best_light, random_starts};
 use veni_image::Picture;
 use veni_image::metrics::Scores;
 use veni_light::latent::Latent;
@@ -130,7 +130,9 @@ impl Fit {
         self.shard.note_idle(pictures.len(), report);
         self.settings.grid(false)?;
         let model = FitModel::new(source::model(&self.model)?)?;
-        let lit = model.lights() > 0 || self.lit.lobes() > 0;
+        // of part of the sphere the brightest is not known
+        let whole = self.input.view().is_none() && self.input.mask().is_none();
+        let lit = model.lights() > 0 && whole || self.lit.lobes() > 0;
         let config = self.settings.config(self.rendered.normals.is_some(), lit)?;
         report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
             self.one(&piped::input(path)?, outputs.get(at), &model, &config, report)
@@ -231,7 +233,8 @@ impl Fit {
         let starts = self.starts(path, observation, model)?;
         self.check_starts(starts.len())?;
         let vectors = model.latent_vectors();
-        let config = self.settings.adapted(*config, partial, vectors);
+        let known = partial.then(|| observation.share());
+        let config = self.settings.adapted(*config, known, vectors);
         let (total, prior) = (config.most_updates(vectors) * starts.len() as u64, model.prior());
         let progress = ProgressBars::new(report);
         progress.begin("", "step", Some(total));
@@ -242,7 +245,7 @@ impl Fit {
         progress.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
         if self.lit.lobes() > 0 {
-            best = self.add_lobes(&best, &target, model, &config, report).map_err(|e| e.in_file(path))?;
+            best = self.lit.add_lobes(&best, &target, model, &config, report).map_err(|e| e.in_file(path))?;
         }
         let scores = match (partial, observation.clipped().is_some()) {
             (false, false) => Some(model.score(&best.latent, observation)?),
@@ -254,36 +257,6 @@ impl Fit {
         }
         let known = Some(observation.share());
         Ok(Fitted { best, known, scores, seconds: started.elapsed().as_secs_f64() })
-    }
-
-    /// The lobes into the latents of all starts.
-    fn add_lobes(
-        &self,
-        best: &Best,
-        target: &FitTarget<'_>,
-        model: &FitModel,
-        config: &FitConfig,
-        report: Report,
-    ) -> veni_light::Result<Best> {
-        let plan = LobePlan { count: self.lit.lobes(), only_lobes: false };
-        let progress = ProgressBars::new(report);
-        progress.begin("lobes", "start", Some(best.all.len() as u64));
-        let one = |latent: &Latent| {
-            let found = fit_lobes(
-                model.decoder(),
-                target,
-                std::slice::from_ref(latent),
-                plan,
-                config,
-                &mut |_, _| {},
-            )?;
-            progress.add(1);
-            Ok(found)
-        };
-        let found = best.all.iter().map(one).collect::<veni_light::Result<Vec<_>>>();
-        progress.end();
-        let (all, losses) = found?.into_iter().flatten().unzip();
-        Ok(Best::of(all, losses))
     }
 
     /// The light on a surface.

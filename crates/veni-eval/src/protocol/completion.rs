@@ -146,7 +146,7 @@ pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
 fn check(grid: Equirect) -> Result<()> {
     if grid.height < MIN_HEIGHT {
         return Err(Error::invalid(format!(
-            "completion scores halves of panoramas, which need {MIN_HEIGHT} rows, not {}; give --size {}x{MIN_HEIGHT} or more",
+            "completion scores halves of panoramas, which need {MIN_HEIGHT} rows, not {}: compare panoramas of {} columns at least",
             grid.height,
             2 * MIN_HEIGHT
         )));

@@ -91,5 +91,8 @@ fn starts_are_zero_and_draws_of_the_prior() {
     assert_eq!((all.len(), &all[0].vectors), (STARTS, &vec![[0.0; 3]; 4]));
     assert!(all[1..].iter().all(|z| z.vectors != all[0].vectors) && all[1] != all[2]);
     assert_ne!(starts(&prior, 4)[1], all[1]);
-    config().check().unwrap();
+    // the less is known, the more the prior weighs; of the whole sphere as little as it may
+    assert!(prior_weight(0.07) > 6.0 * prior_weight(0.5) && (prior_weight(0.5) - 0.02).abs() < 1e-9);
+    assert!(prior_weight(0.0) <= 1.0);
+    config(0.1).check().unwrap();
 }

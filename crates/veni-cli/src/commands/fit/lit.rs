@@ -1,12 +1,14 @@
 //! A panorama and its compact lights apart.
 
 use clap::{Args, value_parser};
-use veni_fit::{Best, Observation, WIDEST_LIGHT, unseen};
+use veni_fit::{Best, FitConfig, FitTarget, LobePlan, Observation, WIDEST_LIGHT, fit_lobes, unseen};
 use veni_image::Picture;
 use veni_light::Result;
 use veni_light::latent::{Latent, Prior};
 use veni_light::light::Lights;
 
+use super::model::FitModel;
+use crate::progress::ProgressBars;
 use crate::report::Report;
 
 #[derive(Args, Debug)]
@@ -50,6 +52,30 @@ impl LitArgs {
             );
         }
         if measured { most } else { 0 }
+    }
+
+    /// The lobes into the latents of all starts, and the best of them again.
+    pub(super) fn add_lobes(
+        &self,
+        best: &Best,
+        target: &FitTarget<'_>,
+        model: &FitModel,
+        config: &FitConfig,
+        report: Report,
+    ) -> Result<Best> {
+        let plan = LobePlan { count: self.lobes(), only_lobes: false };
+        let progress = ProgressBars::new(report);
+        progress.begin("lobes", "start", Some(best.all.len() as u64));
+        let one = |latent: &Latent| {
+            let start = std::slice::from_ref(latent);
+            let found = fit_lobes(model.decoder(), target, start, plan, config, &mut |_, _| {})?;
+            progress.add(1);
+            Ok(found)
+        };
+        let found = best.all.iter().map(one).collect::<Result<Vec<_>>>();
+        progress.end();
+        let (all, losses) = found?.into_iter().flatten().unzip();
+        Ok(Best::of(all, losses))
     }
 
     /// The likely sun of every latent of a fit, if that is asked for, where it would not have been seen.

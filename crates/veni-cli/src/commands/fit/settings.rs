@@ -16,8 +16,8 @@ const LIGHT_PRIOR: f64 = 1e-4;
 
 #[derive(Args, Debug)]
 pub(super) struct Settings {
-    /// What the following options start from [default: energy with --lobes and for models that were trained without the lights of their
-    /// panoramas, else thorough]
+    /// What the following options start from [default: energy with --lobes, and for whole panoramas with models that were trained
+    /// without the lights of theirs; else thorough]
     #[arg(long, value_enum)]
     preset: Option<Preset>,
 
@@ -44,7 +44,7 @@ pub(super) struct Settings {
     share: Option<f64>,
 
     /// Weight of the model's prior over latents; 0 turns it off [default: 0.0001, 0.00001 for more than 16 vectors,
-    /// 0.02 where part of the sphere is unknown, 0.000001 without a picture; with the presets of the papers 0]
+    /// 0.01 over the known part of the sphere where there is an unknown one, 0.000001 without a picture; with the presets of the papers 0]
     #[arg(long, value_name = "WEIGHT")]
     prior: Option<f64>,
 
@@ -247,14 +247,15 @@ impl Settings {
         Ok(config)
     }
 
-    /// What depends on whether part of the sphere is unknown, and on the latent's number of vectors.
-    pub(super) fn adapted(&self, config: FitConfig, partial: bool, vectors: usize) -> FitConfig {
+    /// What depends on how much of the sphere is known, if not all, and on the latent's number of vectors.
+    pub(super) fn adapted(&self, config: FitConfig, known: Option<f32>, vectors: usize) -> FitConfig {
         let prior = match (self.prior, self.preset()) {
-            (None, Preset::Thorough | Preset::Display | Preset::Energy) if partial => unseen::PRIOR,
-            (None, Preset::Thorough | Preset::Display | Preset::Energy) => FitConfig::prior_for(vectors),
+            (None, Preset::Thorough | Preset::Display | Preset::Energy) => {
+                known.map_or_else(|| FitConfig::prior_for(vectors), unseen::prior_weight)
+            }
             _ => config.prior,
         };
-        let free_exposure = self.exposure.map_or(partial, |e| e == Exposure::Free);
+        let free_exposure = self.exposure.map_or(known.is_some(), |e| e == Exposure::Free);
         FitConfig { prior, free_exposure, ..config }
     }
 
