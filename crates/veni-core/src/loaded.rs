@@ -155,17 +155,30 @@ impl LoadedModel {
             images.iter().map(|image| self.without_lights(grid, image)).collect::<Result<Vec<_>>>()?;
         let views: Vec<_> = rests.iter().map(|rest| &*rest.log_radiance).collect();
         let vectors = self.encode_rest(grid, &views)?;
-        let plain: Vec<_> = vectors.into_iter().map(Latent::new).collect();
-        if self.model.config().lights == 0 {
-            return Ok(plain);
-        }
-        let decoded = self.decode(grid, &plain)?;
-        let whole = |((rest, decoded), plain): ((&Rest<'_>, Vec<f32>), Latent)| {
-            let change = lit_exposure(grid, &rest.log_radiance, &decoded, &rest.code.lights);
-            let lights = rest.code.lights.scaled((-change).exp());
-            Latent { lights, log_exposure: rest.code.log_exposure + change, ..plain }
+        let whole = |(rest, vectors): (&Rest<'_>, Vec<[f32; 3]>)| {
+            let mut plain = [Latent::new(vectors)];
+            self.expose(grid, rest, &mut plain)?;
+            let [plain] = plain;
+            let lights = rest.code.lights.scaled((-plain.log_exposure).exp());
+            let log_exposure = rest.code.log_exposure + plain.log_exposure;
+            Ok(Latent { lights, log_exposure, ..plain })
         };
-        Ok(rests.iter().zip(decoded).zip(plain).map(whole).collect())
+        rests.iter().zip(vectors).map(whole).collect()
+    }
+
+    /// Moves the exposures of latents of an image without its lights to where surfaces get the image's light, [`lit_exposure`]; of a model
+    /// whose codes have no lights not at all.
+    ///
+    /// # Errors
+    /// As [`LoadedModel::decode`].
+    pub fn expose(&self, grid: Equirect, rest: &Rest<'_>, latents: &mut [Latent]) -> Result<()> {
+        if self.model.config().lights == 0 {
+            return Ok(());
+        }
+        for (decoded, latent) in self.decode(grid, latents)?.iter().zip(latents) {
+            latent.log_exposure += lit_exposure(grid, &rest.log_radiance, decoded, &rest.code.lights);
+        }
+        Ok(())
     }
 
     /// The vectors of the encoder's posteriors' means for images whose lights are out ([`LoadedModel::without_lights`]).

@@ -157,6 +157,9 @@ impl Fit {
                 let rest = lit.rest.as_ref().unwrap_or(&picture);
                 let observation = self.input.observe(rest, grid).map_err(|e| e.in_file(path))?;
                 let mut fitted = self.fit(path, &observation, model, config, report)?;
+                if !observation.is_partial() && self.settings.exposure_is_open() {
+                    lit.expose(&mut fitted.best, &observation, model)?;
+                }
                 lit.put_into(&mut fitted.best);
                 if lit.lights.sun().is_none() {
                     self.lit.guess(&model.prior(), &mut fitted.best, &observation, report)?;

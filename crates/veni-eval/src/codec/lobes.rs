@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::Codec;
-use super::model::{LIGHT, code, latent};
+use super::model::{LIGHT, code, exposed, latent};
 use crate::Result;
 use crate::canonical::Canonical;
 use veni_core::LoadedModel;
@@ -47,13 +47,16 @@ impl Codec for Lobed<'_> {
     }
 
     fn key(&self) -> Canonical {
-        Canonical::of(json!({
-            "model": self.subject.identity(),
-            "pass": "lobes",
-            "lobes": self.lobes,
-            "widest": WIDEST_LIGHT,
-            "fit": self.config,
-        }))
+        exposed(
+            self.subject,
+            json!({
+                "model": self.subject.identity(),
+                "pass": "lobes",
+                "lobes": self.lobes,
+                "widest": WIDEST_LIGHT,
+                "fit": self.config,
+            }),
+        )
     }
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
@@ -70,7 +73,9 @@ impl Codec for Lobed<'_> {
         let plan = LobePlan { count: self.lobes, only_lobes: false };
         let found = fit_lobes(decoder, &target, &begun, plan, &self.config, &mut |_, _| {})?;
         let mut all: Vec<f32> = vec![rest.code.lights.len() as f32];
-        for (fitted, _) in found {
+        let mut found: Vec<Latent> = found.into_iter().map(|(latent, _)| latent).collect();
+        self.subject.expose(grid, &rest, &mut found)?;
+        for fitted in found {
             let z = Latent {
                 lights: rest.code.lights.scaled((-fitted.log_exposure).exp()),
                 log_exposure: fitted.log_exposure + rest.code.log_exposure,

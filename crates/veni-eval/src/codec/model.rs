@@ -64,12 +64,7 @@ impl Codec for Autoencoder<'_> {
     }
 
     fn key(&self) -> Canonical {
-        let mut key = json!({ "model": self.subject.identity(), "pass": "autoencoder" });
-        if self.subject.model().config().lights > 0 {
-            // codes with lights were at another exposure before
-            key["exposure"] = json!("surfaces");
-        }
-        Canonical::of(key)
+        exposed(self.subject, json!({ "model": self.subject.identity(), "pass": "autoencoder" }))
     }
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
@@ -99,12 +94,15 @@ impl Codec for Optimised<'_> {
             Start::Encoder => "encoder",
             Start::Zero => "zero",
         };
-        Canonical::of(json!({
-            "model": self.subject.identity(),
-            "pass": "optimised",
-            "start": start,
-            "fit": self.settings.key(),
-        }))
+        exposed(
+            self.subject,
+            json!({
+                "model": self.subject.identity(),
+                "pass": "optimised",
+                "start": start,
+                "fit": self.settings.key(),
+            }),
+        )
     }
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
@@ -114,7 +112,8 @@ impl Codec for Optimised<'_> {
             Start::Zero => vec![[0.0; 3]; self.subject.latent_vectors()],
         };
         let fitted = self.settings.fit(self.subject, grid, &[&*rest.log_radiance], &[Latent::new(vectors)]);
-        let fitted = fitted.map_err(|e| Error::invalid(format!("{}: {e}", self.subject.name())))?.latents;
+        let mut fitted = fitted.map_err(|e| Error::invalid(format!("{}: {e}", self.subject.name())))?.latents;
+        self.subject.expose(grid, &rest, &mut fitted)?;
         // the fit may have moved the exposure of the rest, which the lights do not share
         let whole = |z: Latent| Latent {
             lights: rest.code.lights.scaled((-z.log_exposure).exp()),
@@ -127,6 +126,14 @@ impl Codec for Optimised<'_> {
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>> {
         Ok(self.subject.decode(grid, &[latent(self.subject, code)])?.concat())
     }
+}
+
+/// The key of a pass: codes with lights were at another exposure before, and are kept under that key.
+pub(super) fn exposed(subject: &LoadedModel, mut key: serde_json::Value) -> Canonical {
+    if subject.model().config().lights > 0 {
+        key["exposure"] = json!("surfaces");
+    }
+    Canonical::of(key)
 }
 
 /// The parameters of a light.

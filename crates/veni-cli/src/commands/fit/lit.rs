@@ -1,7 +1,9 @@
 //! A panorama and its compact lights apart.
 
 use clap::{Args, value_parser};
-use veni_fit::{Best, FitConfig, FitTarget, LobePlan, Observation, WIDEST_LIGHT, fit_lobes, unseen};
+use veni_fit::{
+    Best, FitConfig, FitTarget, LobePlan, Observation, WIDEST_LIGHT, fit_lobes, lit_exposure, unseen,
+};
 use veni_image::Picture;
 use veni_light::Result;
 use veni_light::latent::{Latent, Prior};
@@ -130,6 +132,21 @@ impl Lit {
         }
         let (rest, lights) = unseen::seen_lights(picture, most, widest)?;
         Ok(Self { rest: Some(rest), lights })
+    }
+
+    /// Every latent at the exposure at which surfaces get the light of the whole panorama, where lights were looked for.
+    pub(super) fn expose(&self, best: &mut Best, seen: &Observation, model: &FitModel) -> anyhow::Result<()> {
+        if self.rest.is_none() {
+            return Ok(());
+        }
+        // in the unit of the observation
+        let lights = self.lights.scaled((-seen.log_exposure()).exp());
+        for latent in best.all.iter_mut().chain([&mut best.latent]) {
+            let log_exposure = latent.log_exposure - seen.log_exposure();
+            let decoded = model.decode(seen.grid(), &Latent { log_exposure, ..latent.clone() })?;
+            latent.log_exposure += lit_exposure(seen.grid(), seen.log_radiance(), &decoded, &lights);
+        }
+        Ok(())
     }
 
     /// The lights into every latent that was fitted to the rest, at its exposure.

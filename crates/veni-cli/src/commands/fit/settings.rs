@@ -48,7 +48,8 @@ pub(super) struct Settings {
     #[arg(long, value_name = "WEIGHT")]
     prior: Option<f64>,
 
-    /// Whether the exposure is found too [default: free where part of the sphere is unknown]
+    /// Whether the exposure is found too [default: free where part of the sphere is unknown; after the fit of a panorama whose lights
+    /// are apart, that at which surfaces get its light]
     #[arg(long, value_enum)]
     exposure: Option<Exposure>,
 
@@ -283,6 +284,11 @@ impl Settings {
     /// The same without a picture: what it leaves open is left to the prior, not to several starts.
     pub(super) fn start_unseen(&self) -> (Start, usize) {
         (self.start.unwrap_or(Start::Zero), self.starts.unwrap_or(1).max(1))
+    }
+
+    /// Whether nothing was said about the exposure.
+    pub(super) fn exposure_is_open(&self) -> bool {
+        self.exposure.is_none()
     }
 
     pub(super) fn seed(&self) -> u64 {

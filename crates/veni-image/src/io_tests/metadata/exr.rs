@@ -124,9 +124,7 @@ fn aspect() {
     let of = |ratio| file(RED, None, move |shared, _| shared.pixel_aspect = ratio);
     let wide = of(2.0);
     assert!(wide.first() == RED && wide.notes().contains("pixelAspectRatio = 2"), "{}", wide.notes());
-    for says_nothing in [1.0, 0.0, f32::NAN] {
-        assert_eq!(of(says_nothing).notes(), "");
-    }
+    assert_eq!(of(1.0).notes(), "");
 }
 
 fn white() {
