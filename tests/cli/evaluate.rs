@@ -161,7 +161,7 @@ fn parts_of_the_scene_are_compared_with_training_panoramas() {
     dir.refused(&args("photo", &panorama(), &[]), &["no train/", "--train"]);
     dir.refused(&args("light", &data, &["--train", &data]), &["--train", "evaluate photo"]);
     let run = Dir::new().run(&args("completion", &val, &["--train", &val]));
-    assert!(run.code == Some(2) && run.err.contains("--train and of --data"), "{}", run.err);
+    assert!(run.code == Some(2) && run.err.contains("training panoramas"), "{}", run.err);
     // of the folder with both, and of val/ alone
     let [photo] = &dir.json(&args("photo", &data, &[]))[..] else { panic!("one table") };
     let rows = photo["rows"].as_array().unwrap();

@@ -145,7 +145,7 @@ impl UnseenSettings {
 }
 
 /// The largest of `most`, `most`/2, … that divides both sides.
-fn dividing(grid: Equirect, most: usize) -> usize {
+pub(crate) fn dividing(grid: Equirect, most: usize) -> usize {
     let divides = |n: &usize| grid.width.is_multiple_of(*n) && grid.height.is_multiple_of(*n);
     std::iter::successors(Some(most), |n| (*n > 1).then_some(n / 2)).find(divides).unwrap_or(1)
 }

@@ -6,11 +6,15 @@ use super::Codec;
 use super::model::{LIGHT, code, exposed, latent};
 use crate::Result;
 use crate::canonical::Canonical;
+use crate::fitting::dividing;
 use veni_core::LoadedModel;
+use veni_data::coarsen::{averaged, coarse_grid};
 use veni_fit::{FitConfig, FitTarget, LobePlan, WIDEST_LIGHT, fit, fit_lobes};
 use veni_light::latent::{Latent, Lobe};
 use veni_light::sphere::Equirect;
 
+/// Columns of the panorama at which vectors and lobes are fitted, as `veni-cli fit` does it; lights are measured at the panorama's own.
+const FITTED: usize = 128;
 /// The parameters of a lobe.
 const LOBE: usize = 7;
 
@@ -61,11 +65,13 @@ impl Codec for Lobed<'_> {
 
     fn encode(&self, grid: Equirect, image: &[f32]) -> Result<Vec<f32>> {
         let rest = self.subject.without_lights_up_to(grid, image, WIDEST_LIGHT)?;
-        let images = [&*rest.log_radiance];
         let vectors = match self.subject.veni() {
-            Some(_) => self.subject.encode_rest(grid, &images)?.remove(0),
+            Some(_) => self.subject.encode_rest(grid, &[&rest.log_radiance])?.remove(0),
             None => vec![[0.0; 3]; self.subject.latent_vectors()],
         };
+        let factor = dividing(grid, (grid.width / FITTED).max(1));
+        let (fine, image) = (grid, averaged(grid, &rest.log_radiance, factor));
+        let (grid, images) = (coarse_grid(grid, factor), [image.as_slice()]);
         let prior = self.subject.prior();
         let target = FitTarget::panoramas(grid, &images)?.with_prior(&prior);
         let (decoder, start) = (self.subject.fit_decoder().as_dyn(), [Latent::new(vectors)]);
@@ -74,7 +80,7 @@ impl Codec for Lobed<'_> {
         let found = fit_lobes(decoder, &target, &begun, plan, &self.config, &mut |_, _| {})?;
         let mut all: Vec<f32> = vec![rest.code.lights.len() as f32];
         let mut found: Vec<Latent> = found.into_iter().map(|(latent, _)| latent).collect();
-        self.subject.expose(grid, &rest, &mut found)?;
+        self.subject.expose(fine, &rest, &mut found)?;
         for fitted in found {
             let z = Latent {
                 lights: rest.code.lights.scaled((-fitted.log_exposure).exp()),

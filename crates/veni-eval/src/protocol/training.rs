@@ -19,7 +19,7 @@ const TURNS: usize = 12;
 pub(super) fn training<'a>(run: &Evaluation<'a>, protocol: &str) -> Result<&'a Dataset> {
     let train = run.train.filter(|train| !train.is_empty()).ok_or_else(|| {
         Error::invalid(format!(
-            "{protocol} compares with what is known from training panoramas: name their folder with --train"
+            "{protocol} compares with what is known from training panoramas: name a folder of some"
         ))
     })?;
     // one file may have several names
@@ -27,7 +27,7 @@ pub(super) fn training<'a>(run: &Evaluation<'a>, protocol: &str) -> Result<&'a D
     let evaluated: Vec<_> = run.data.items().iter().map(place).collect();
     if let Some(both) = train.items().iter().find(|item| evaluated.contains(&place(item))) {
         return Err(Error::invalid(format!(
-            "{}: is among the panoramas of --train and of --data, and would be found as its own nearest; give others with --train",
+            "{}: is among the training panoramas and among those that are judged, and would be found as its own nearest; name other training panoramas",
             both.path.display()
         )));
     }

@@ -76,8 +76,8 @@ fn training_panoramas_are_needed_and_are_others() {
         evaluated(folder.path(), &subjects, &data, quick(), run).0
     };
     for protocol in [photo::run, completion::run] {
-        assert!(refused(protocol, None).contains("--train"));
+        assert!(refused(protocol, None).contains("training panoramas"));
         let message = refused(protocol, Some(&data));
-        assert!(message.contains("sky-0.exr") && message.contains("--data"), "{message}");
+        assert!(message.contains("sky-0.exr") && message.contains("judged"), "{message}");
     }
 }
