@@ -90,6 +90,7 @@ impl CubeFace {
     }
 
     /// The solid angle of every texel of a face, row-major. A quarter of the face is its mirror images, and half of that again.
+    #[cfg(any(test, feature = "prefilter"))]
     pub(crate) fn solid_angles(size: usize) -> Vec<f64> {
         let half = size.div_ceil(2);
         let mut corners = vec![0.0; (half + 1) * (half + 1)];
