@@ -1,6 +1,6 @@
 //! `photo`: from a photograph of part of the scene to the whole light. MODEL (77, 80).
 //!
-//! Of each panorama a camera takes four photographs of eight bits ([`Camera`]); the latent that is fitted to one, with the sun that
+//! Of each panorama a camera takes four photographs of eight bits; the latent that is fitted to one, with the sun that
 //! the prior thinks likely out of sight ([`UnseenSettings`]), is judged as `light` and `spheres` judge, in the camera's frame. Beside it
 //! the mean sky of the training panoramas and the training panorama whose photograph is nearest. A photograph does not tell how
 //! bright its white is: the measures do not depend on exposure, but for one that is told.
