@@ -3,7 +3,7 @@
 //! Of each panorama a camera takes four photographs of eight bits; the latent that is fitted to one, with the sun that
 //! the prior thinks likely out of sight ([`UnseenSettings`]), is judged as `light` and `spheres` judge, in the camera's frame. Beside it
 //! the mean sky of the training panoramas and the training panorama whose photograph is nearest. A photograph does not tell how
-//! bright its white is: the measures do not depend on exposure, but for one that is told.
+//! bright its white is: the measures do not depend on exposure, but for the one that takes the white as known.
 
 use serde_json::json;
 
