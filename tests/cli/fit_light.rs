@@ -53,20 +53,23 @@ fn irradiance_and_light_meters_are_met_and_what_is_open_is_likely() {
         "bake", "--seed", "6", "--sun", "none", "-o", "sky.exr", "--size", "256", "--device", "cpu", "-q",
     ]);
     dir.ok(&["light", "sky.exr", "-o", "x.json", "-q"]);
-    let six = one(&dir, &["fit", "--target-irradiance", "x.json", "-o", "six.json"]);
+    let six = one(&dir, &["fit", "--target-irradiance", "x.json", "--resolution", "64", "-o", "six.json"]);
     assert!(six["irradiance_error"].as_f64().unwrap() < 1e-2, "{}", six["irradiance_error"]);
     assert_eq!((six["sh_error"].clone(), six["irradiance"].as_array().unwrap().len()), (Value::Null, 6));
     dir.write(
         "meters.json",
         r#"[{"normal":[0,0,3],"irradiance":[2,2.2,2.6]},{"normal":[1,0,0],"illuminance":1.5}]"#,
     );
-    let found = one(&dir, &["fit", "--target-irradiance", "meters.json", "-o", "m.json"]);
+    let found =
+        one(&dir, &["fit", "--target-irradiance", "meters.json", "--resolution", "64", "-o", "m.json"]);
     assert!(found["irradiance_error"].as_f64().unwrap() < 1e-2, "{found}");
     let up = triples(&serde_json::json!([found["irradiance"][0]["irradiance"]]))[0];
     assert!((up[1] - 2.2).abs() < 0.05, "{up:?}");
     // more starts end elsewhere, and say how open it is
     let images = ["--starts", "3", "--uncertainty", "u.exr", "--completed", "c.exr", "--size", "32"];
-    let args = [&["fit", "--target-irradiance", "meters.json", "-o", "n.json"][..], &images].concat();
+    let args =
+        [&["fit", "--target-irradiance", "meters.json", "--resolution", "64", "-o", "n.json"][..], &images]
+            .concat();
     assert_eq!(one(&dir, &args)["losses"].as_array().unwrap().len(), 3);
     let uncertainty = readers::exr(&dir.path("u.exr"));
     assert!(
@@ -89,7 +92,11 @@ fn illuminance_is_that_of_the_latent_s_light() {
     dir.ok(&["fit", &sky, "--illuminance", "20000", "-o", "seen.json", "-q"]);
     dir.ok(&["fit", "--illuminance", "20000", "-o", "alone.json", "-q"]);
     dir.ok(&["light", &sky, "-o", "x.json", "-q"]);
-    dir.ok(&["fit", "--target-sh", "x.json", "--illuminance", "300", "-o", "sh.json", "-q"]);
+    dir.ok(&[
+        &["fit", "--target-sh", "x.json", "--illuminance", "300"][..],
+        &["--resolution", "64", "-o", "sh.json", "-q"],
+    ]
+    .concat());
     // light takes what is compact for discs and sums the rest coarsely: half a percent
     for (file, wanted) in [("seen.json", 2e4), ("alone.json", 2e4), ("sh.json", 300.0)] {
         let found = lux(file);
