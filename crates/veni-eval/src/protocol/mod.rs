@@ -151,7 +151,7 @@ impl<'a> Evaluation<'a> {
         let lobes = match self.lobes {
             [] => "",
             _ => {
-                " With lobes: vectors and lobes on every pixel, with an energy weight of 0.35, lights no wider than 1.5°."
+                " With lobes: vectors and lobes at 128 columns, with an energy weight of 0.35, lights no wider than 1.5°."
             }
         };
         format!(
