@@ -202,7 +202,7 @@ fn bad_input_is_explained() {
         refused(&["--mesh", file], &[file, word]);
     }
     dir.write("bytes.obj", [0xff, 0x80, 0xfe, b'\n']);
-    refused(&["--mesh", "bytes.obj"], &["bytes.obj", "empty"]);
+    refused(&["--mesh", "bytes.obj"], &["bytes.obj", "text"]);
     refused(&["--mesh", "missing.obj"], &["missing.obj", "No such file"]);
     refused(&["--normals", "n.png"], &["n.png", ".exr"]);
     refused(&["--mask", "m.exr"], &["m.exr", ".png"]);

@@ -79,14 +79,15 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Placed> {
     Ok(Placed { mesh: Mesh { positions, normals: (with > 0).then_some(normals), triangles }, origin })
 }
 
-/// Names and comments may be in any of the old code pages, of which nothing here is used: what is not UTF-8 is read all the same. No
-/// text has a zero byte.
+/// Names and comments may be in any of the old code pages, of which nothing here is used: what is not UTF-8 is read all the same,
+/// if there is a vertex in it. No text has a zero byte.
 fn decode(bytes: Vec<u8>) -> Option<String> {
     let is_marked = matches!(bytes.as_slice(), [0xff, 0xfe, ..] | [0xfe, 0xff, ..]);
     if is_marked || !bytes.contains(&0) && std::str::from_utf8(&bytes).is_ok() {
         return text::decode(bytes).ok();
     }
-    (!bytes.contains(&0)).then(|| String::from_utf8_lossy(&bytes).into_owned())
+    let text = (!bytes.contains(&0)).then(|| String::from_utf8_lossy(&bytes).into_owned());
+    text.filter(|text| text.lines().any(|line| line.trim_start().starts_with("v ")))
 }
 
 /// The middle of the points where it is far from the origin; else the origin.
