@@ -212,33 +212,34 @@ fn the_first_command_of_a_newcomer_gives_a_sky() {
 
 #[cfg(feature = "pretrained-large")]
 #[test]
-fn larger_models_inside_the_program_go_by_their_size() {
+fn models_inside_the_program_go_by_their_names() {
     let dir = Dir::new();
-    for (size, vectors) in [("27", 9), ("147", 49), ("300", 100)] {
-        let sky = format!("{size}.exr");
-        dir.ok(&["bake", "--model", size, "--seed", "7", "--size", "32", "-o", &sky]);
+    for (name, vectors) in [("27", 9), ("vectors-147", 49), ("vectors-300", 100)] {
+        let sky = format!("{name}.exr");
+        dir.ok(&["bake", "--model", name, "--seed", "7", "--size", "32", "-o", &sky]);
         let latent = &dir.json(&["inspect", &sky])[0]["latent"];
         assert_eq!(latent["n"].as_u64(), Some(vectors), "{latent}");
         // it goes back through its own model, named or found, and through no other
-        dir.ok(&["bake", &sky, "--model", size, "--size", "16", "-o", "named.exr", "--force"]);
+        dir.ok(&["bake", &sky, "--model", name, "--size", "16", "-o", "named.exr", "--force"]);
         dir.ok(&["bake", &sky, "--size", "16", "-o", "found.exr", "--force"]);
         assert_eq!(
             std::fs::read(dir.path("named.exr")).unwrap(),
             std::fs::read(dir.path("found.exr")).unwrap()
         );
     }
-    let wrong = ["bake", "300.exr", "--model", "27", "-o", "wrong.png"];
-    dir.refused(&wrong, &["100 vectors", "has 9", "--model 300"]);
-    let both = ["bake", "27.exr", "300.exr", "--size", "16", "--out-dir", "both"];
+    let wrong = ["bake", "vectors-300.exr", "--model", "27", "-o", "wrong.png"];
+    dir.refused(&wrong, &["100 vectors", "has 9", "--model vectors-300"]);
+    let both = ["bake", "27.exr", "vectors-300.exr", "--size", "16", "--out-dir", "both"];
     let run = dir.run(&both);
     assert_eq!(
-        (run.code, run.err.contains("300.exr"), run.err.contains("--model 300")),
+        (run.code, run.err.contains("vectors-300.exr"), run.err.contains("--model vectors-300")),
         (Some(2), true, true)
     );
-    dir.refused(&["bake", "--model", "28", "--seed", "1", "-o", "none.png"], &["28", "27, 147, 300"]);
+    let unknown = ["bake", "--model", "28", "--seed", "1", "-o", "none.png"];
+    dir.refused(&unknown, &["28", "27, 147, 300, vectors-147, vectors-300"]);
     // a file of that name comes first
-    std::fs::copy(model(), dir.path("147")).unwrap();
-    dir.ok(&["bake", "--model", "147", "--seed", "1", "--size", "16", "-o", "file.exr"]);
+    std::fs::copy(model(), dir.path("vectors-147")).unwrap();
+    dir.ok(&["bake", "--model", "vectors-147", "--seed", "1", "--size", "16", "-o", "file.exr"]);
     let latent = &dir.json(&["inspect", "file.exr"])[0]["latent"];
     assert_ne!(latent["n"].as_u64(), Some(49), "{latent}");
 }

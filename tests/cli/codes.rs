@@ -135,7 +135,9 @@ fn lobes_bring_detail_to_codes_that_are_encoded_and_fitted() {
     let file = text(&panoramas().join("val/kloppenheim_05.exr"));
     let score = |command: &str, lobes: &str| -> f64 {
         let out = format!("{command}-{lobes}.json");
-        let [said] = &dir.json(&[command, &file, "--lobes", lobes, "-o", &out])[..] else { panic!("one") };
+        // one light: wide ones beside it would be detail of their own
+        let args = [command, &file, "--lobes", lobes, "--compact-lights", "1", "-o", &out];
+        let [said] = &dir.json(&args)[..] else { panic!("one") };
         said["ldr_psnr"].as_f64().unwrap()
     };
     let [plain, encoded] = ["0", "6"].map(|lobes| score("encode", lobes));
@@ -158,4 +160,36 @@ fn lobes_bring_detail_to_codes_that_are_encoded_and_fitted() {
     assert!(close(once, again, 1e-6));
     let run = dir.run(&["fit", &file, "--lobes", "257", "-o", "x.json"]);
     assert!(run.code == Some(2) && run.err.contains("257"), "{}", run.err);
+}
+
+#[test]
+fn sizes_name_lobes() {
+    let dir = Dir::new();
+    let file = text(&panoramas().join("val/kloppenheim_05.exr"));
+    dir.ok(&["encode", &file, "-o", "27.json"]);
+    dir.ok(&["encode", &file, "--model", "147", "-o", "147.json"]);
+    dir.ok(&["encode", &file, "--model", "147", "--lobes", "2", "-o", "2.json"]);
+    dir.ok(&["bake", &file, "--model", "147", "--size", "16", "-o", "encoded.exr"]);
+    let lobes = |name: &str| Latent::load(dir.path(name)).unwrap().lobes.len();
+    assert_eq!(["27.json", "147.json", "2.json"].map(lobes), [0, 16, 2]);
+    let said = dir.ok(&["inspect", "encoded.exr"]);
+    assert!(said.contains("and 16 lobes of model"), "{said}");
+    // a code belongs to the model of its vectors, whichever size it was named by
+    dir.ok(&["bake", "147.json", "--size", "16", "-o", "a.exr", "--float"]);
+    dir.ok(&["bake", "147.json", "--model", "300", "--size", "16", "-o", "b.exr", "--float"]);
+    assert_eq!(sums(&dir.path("a.exr")), sums(&dir.path("b.exr")));
+}
+
+#[test]
+fn random_skies_are_those_of_the_vectors_for_every_size() {
+    let dir = Dir::new();
+    let bake = |model: &str| {
+        let out = format!("{model}.exr");
+        let run = dir.run(&["bake", "--model", model, "--seed", "7", "--size", "16", "--float", "-o", &out]);
+        assert_eq!(run.code, Some(0), "{}", run.err);
+        (sums(&dir.path(&out)), run.err)
+    };
+    let ((plain, silent), (sized, said)) = (bake("27"), bake("300"));
+    assert_eq!(plain, sized);
+    assert!(said.contains("no lobes") && !silent.contains("lobes"), "{said}{silent}");
 }

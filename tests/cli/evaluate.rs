@@ -311,3 +311,47 @@ fn damaged_results_are_named() {
     dir.ok(&args("reconstruction", &data, &["-q"]));
     assert_eq!(std::fs::read(&file).unwrap(), whole, "computed again to the bit");
 }
+
+#[cfg(feature = "pretrained")]
+#[test]
+fn sizes_of_codes_are_compared_by_name() {
+    let (dir, data) = (Dir::new(), text(panoramas()));
+    let args = |protocol, rest: &[&'static str]| {
+        let mut all =
+            vec!["evaluate", protocol, "--model", "27", "147", "--quick", "--images", "1", "--size", "64"];
+        all.extend(["--baselines", "sg"].iter().chain(rest));
+        all
+    };
+    let with = |mut all: Vec<&'static str>| -> Vec<String> {
+        all.extend(["--out", "eval"]);
+        all.iter().map(|s| (*s).to_owned()).chain(["--data".to_owned(), data.clone()]).collect()
+    };
+    let run = |all: Vec<String>| dir.json(&all.iter().map(String::as_str).collect::<Vec<_>>());
+    let [one] = &run(with(args("reconstruction", &["--compact-lights", "1"])))[..] else {
+        panic!("one table")
+    };
+    let rows = one["rows"].as_array().unwrap();
+    let of = |system: &str, pass: &str| {
+        let row = rows.iter().find(|row| row["System"] == system && row["Pass"] == pass);
+        let row = row.unwrap_or_else(|| panic!("no {system}, {pass} in {one}"));
+        (row["D"].as_f64().unwrap(), row["LDR PSNR (exp.)"].as_f64().unwrap())
+    };
+    for pass in ["autoencoder", "optimised"] {
+        let (small, large) = (of("27", pass), of("147", pass));
+        assert_eq!((small.0, large.0), (34.0, 146.0));
+        assert!(large.1 > small.1 + 1.0, "{pass}: {small:?} and {large:?}");
+    }
+    // bases of the sizes that the models have
+    assert!(of("SG 27", "optimised").1 < of("SG 141", "optimised").1);
+    let [usual] = &run(with(args("reconstruction", &[])))[..] else { panic!("one table") };
+    assert_eq!(usual["rows"][0]["D"], 27.0 + 4.0 * 7.0);
+    let all = with(args("uniqueness", &[]));
+    let all: Vec<_> = all.iter().map(String::as_str).collect();
+    dir.refused(&all, &["--model 147", "vectors-147"]);
+}
+
+#[test]
+fn lights_of_models_that_draw_them_are_refused() {
+    let (dir, data) = (Dir::new(), text(panoramas()));
+    dir.refused(&args("light", &data, &["--compact-lights", "2"]), &["--compact-lights", "leave it out"]);
+}

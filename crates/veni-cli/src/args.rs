@@ -8,8 +8,9 @@ use veni_image::ReadOptions;
 /// Which model decodes (and encodes).
 #[derive(Args, Debug)]
 pub(crate) struct ModelArgs {
-    /// Model file (.safetensors, or a training run's folder), or the latent dimension D of one inside this
-    /// program: 27, 147 or 300 [default: the one inside that a latent names, or 27]
+    /// Model file (.safetensors, or a training run's folder), or the size D of the codes of one inside this program: 27 (9
+    /// vectors; lights are 7 numbers each), 147 and 300 (the same with 16 and 38 lobes for the detail of a panorama); vectors-147
+    /// and vectors-300 have 49 and 100 vectors instead [default: the one inside that a latent names, or 27]
     #[arg(long, short, value_name = "FILE|SIZE")]
     pub(crate) model: Option<PathBuf>,
 }

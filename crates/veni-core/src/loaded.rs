@@ -11,7 +11,7 @@ use crate::{Error, Result};
 use veni_fit::lit_exposure;
 use veni_light::field;
 use veni_light::latent::{Latent, Prior};
-use veni_light::light::LightOptions;
+use veni_light::light::{LightOptions, Lights};
 use veni_light::model::{Model, ModelKind};
 use veni_light::sphere::{Equirect, Stripes};
 
@@ -24,6 +24,8 @@ pub struct LoadedModel {
     model: Arc<Model>,
     decoder: Arc<Decoding>,
     device: Device,
+    lights: usize,
+    lobes: usize,
 }
 
 /// What is left of an image without its compact lights.
@@ -64,10 +66,46 @@ impl LoadedModel {
         Ok(Self {
             name: name.into(),
             identity: model.digest().to_string(),
+            lights: model.config().measured_lights(),
+            lobes: 0,
             model: Arc::new(model),
             decoder: Arc::new(decoder),
             device: device.clone(),
         })
+    }
+
+    /// The same model with up to `lights` lights measured in each panorama.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] above [`Lights::MOST`], or if the model was trained on panoramas with their lights: its field draws them.
+    pub fn with_lights(self, lights: usize) -> Result<Self> {
+        if lights > Lights::MOST {
+            return Err(Error::invalid(format!("{lights} lights are more than {}", Lights::MOST)));
+        }
+        if lights > 0 && self.model.config().lights == 0 {
+            let name = self.name;
+            return Err(Error::invalid(format!(
+                "{name}: this model was trained on panoramas with their lights, which its field draws; it has none beside them"
+            )));
+        }
+        Ok(Self { lights, ..self })
+    }
+
+    /// The most lights that are measured in a panorama: [`ModelConfig::measured_lights`](veni_light::model::ModelConfig::measured_lights)
+    /// unless [`LoadedModel::with_lights`] said otherwise.
+    pub fn lights(&self) -> usize {
+        self.lights
+    }
+
+    /// The same model with `lobes` lobes in each code.
+    #[must_use]
+    pub fn with_lobes(self, lobes: usize) -> Self {
+        Self { lobes, ..self }
+    }
+
+    /// The lobes of a panorama's code beside vectors and lights: 0 unless [`LoadedModel::with_lobes`] said otherwise.
+    pub fn lobes(&self) -> usize {
+        self.lobes
     }
 
     /// What holds its networks.
@@ -172,7 +210,7 @@ impl LoadedModel {
     /// # Errors
     /// As [`LoadedModel::decode`].
     pub fn expose(&self, grid: Equirect, rest: &Rest<'_>, latents: &mut [Latent]) -> Result<()> {
-        if self.model.config().lights == 0 {
+        if self.lights == 0 {
             return Ok(());
         }
         for (decoded, latent) in self.decode(grid, latents)?.iter().zip(latents) {
@@ -209,7 +247,7 @@ impl LoadedModel {
         image: &'a [f32],
         widest: f32,
     ) -> Result<Rest<'a>> {
-        let lights = self.model.config().lights;
+        let lights = self.lights;
         if lights == 0 {
             return Ok(Rest { log_radiance: image.into(), code: Latent::default() });
         }

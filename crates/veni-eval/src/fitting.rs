@@ -120,7 +120,7 @@ impl UnseenSettings {
     /// # Errors
     /// As [`fit::best_of`]; if the picture is black or unknown.
     pub fn fit(&self, subject: &LoadedModel, picture: &Picture, view: Option<&View>) -> Result<Latent> {
-        let most = subject.model().config().lights;
+        let most = subject.lights();
         let (observation, lights) = match view {
             Some(view) => (Observation::photograph(picture, view, unseen::LONGEST)?, Lights::default()),
             None if most == 0 => (Observation::panorama(picture, unseen::GRID)?, Lights::default()),

@@ -107,6 +107,9 @@ impl Bake {
         let files = jobs.iter().filter_map(|job| job.sky.file());
         let loaded = source::model_of(&self.decoding.model, files)?;
         loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
+        if jobs.iter().any(|job| job.sky.file().is_none()) {
+            loaded.note_random(report);
+        }
         let device = Device::open(self.decoding.device, &loaded.model, report)?;
         let baking = Baking {
             picture,

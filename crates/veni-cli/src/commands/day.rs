@@ -91,6 +91,7 @@ impl Day {
         all.iter().try_for_each(|file| output::refuse_existing(file, overwrite))?;
         let picture = self.pictures.picture()?;
         let loaded = source::model(&self.decoding.model)?;
+        loaded.note_random(report);
         loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
         let device = Device::open(self.decoding.device, &loaded.model, report)?;
         let wishes = Asked::overcast(self.overcast);

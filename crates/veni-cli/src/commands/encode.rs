@@ -49,14 +49,14 @@ pub(crate) struct Encode {
     target: LatentFiles,
 
     /// Take up to N compact lights (the sun, lamps) out of the panorama before it is encoded, and put them into the latent
-    /// [default: as many as the model was trained without]
+    /// [default: 4 with a model that was trained without lights, otherwise 0]
     #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8))]
     compact_lights: Option<u8>,
 
     /// Add K spherical Gaussians to the latent, which fit what the encoder's vectors leave of the panorama: detail of 7 numbers
-    /// each. Lights are then no wider than 1.5°. 'fit --lobes' fits the vectors with them
-    #[arg(long, value_name = "K", default_value_t = 0, hide_default_value = true, value_parser = value_parser!(u16).range(0..=256))]
-    lobes: u16,
+    /// each. Lights are then no wider than 1.5°. 'fit --lobes' fits the vectors with them [default: those of --model 147 and 300, 16 and 38, else 0]
+    #[arg(long, value_name = "K", value_parser = value_parser!(u16).range(0..=256))]
+    lobes: Option<u16>,
 
     /// Also write a PNG: panorama | reconstruction, one pair per row; - is standard output
     #[arg(long, value_name = "OUT.png")]
@@ -81,7 +81,8 @@ impl Encode {
         let overwrite = Overwrite::from(self.force);
         let outputs = self.outputs(overwrite, report)?;
         let loaded = source::model(&self.model)?;
-        let encoding = Encoding::new(&loaded, self.compact_lights.map(usize::from), usize::from(self.lobes))?;
+        let encoding =
+            Encoding::new(&loaded, self.compact_lights.map(usize::from), self.lobes.map(usize::from))?;
         let mut sheet =
             self.preview.as_ref().map(|_| Sheet::new(2, self.panoramas.len(), PREVIEW[0], PREVIEW[1]));
         self.shard.note_idle(self.panoramas.len(), report);

@@ -64,7 +64,7 @@ pub(crate) struct Evaluate {
     #[arg(value_enum)]
     protocol: Protocol,
 
-    /// Models (.safetensors, training runs' folders, or 27, 147, 300: those inside this program), each with a name for
+    /// Models (.safetensors, training runs' folders, or 27, 147, 300, vectors-147, vectors-300: those inside this program), each with a name for
     /// the tables if one is given [default: veni=27]
     #[arg(long = "model", short, value_name = "[NAME=]FILE", num_args = 1..)]
     models: Vec<String>,
@@ -100,6 +100,11 @@ pub(crate) struct Evaluate {
     /// Also rows of each model with K lobes fitted to each panorama beside its vectors (reconstruction, light, spheres)
     #[arg(long, value_name = "K", num_args = 1..)]
     lobes: Vec<usize>,
+
+    /// Measure up to N compact lights (the sun, lamps) of each panorama beside the vectors of models that were trained without
+    /// [default: 4]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=8))]
+    compact_lights: Option<u8>,
 
     /// Fewer steps, pixels and pairs: a trend in minutes
     #[arg(long)]
@@ -221,7 +226,16 @@ impl Evaluate {
         };
         inputs::check_folder(&self.out)?;
         let device = DeviceKind::Flex;
-        let subjects = inputs::subjects(&self.models, device)?;
+        let subjects = inputs::subjects(&self.models, self.compact_lights, device)?;
+        if !self.protocol.knows_lobes()
+            && let Some(subject) = subjects.iter().find(|subject| subject.lobes() > 0)
+        {
+            bail!(
+                "--model {}: this experiment is about vectors and lights alone, which are those of model 27; name 27, vectors-147 or \
+                 vectors-300",
+                subject.name()
+            );
+        }
         let lpips = if self.lpips.is_empty() { None } else { Some(Lpips::load(&self.lpips, device)?) };
         let load = |files: &[PathBuf]| {
             let data = Dataset::load_observed(files, grid, &self.layer.options(), &progress);
@@ -311,6 +325,11 @@ impl Protocol {
     /// Whether training panoramas stand beside the models.
     fn has_baselines(self) -> bool {
         matches!(self, Self::Photo | Self::Completion)
+    }
+
+    /// Whether it reports codes with lobes.
+    fn knows_lobes(self) -> bool {
+        matches!(self, Self::Reconstruction | Self::DatasetSize | Self::Light | Self::Spheres)
     }
 
     fn run(self, evaluation: &Evaluation<'_>, published: &Published) -> veni_light::Result<Findings> {

@@ -65,7 +65,7 @@ use settings::{Settings, Start};
         veni-cli fit ball.exr --normals n.exr --mask m.png --ks 0.2 -o light.json --completed light.exr\n  \
         veni-cli light sky.exr -o light.json && veni-cli fit --target-sh light.json -o sky.json\n  \
         veni-cli fit sky.exr --illuminance 20000 -o sky.json      radiance in cd/m², 20,000 lux on the ground\n  \
-        veni-cli fit sky.exr --lobes 38 -o sky.json      a code of D = 300: vectors, the sun, lobes for detail\n  \
+        veni-cli fit sky.exr --model 300 -o sky.json     a code of D = 300: vectors, the sun, 38 lobes for detail\n  \
         veni-cli fit sky.exr --preset display -o sky.json && veni-cli bake sky.json -o again.exr"
 )]
 pub(crate) struct Fit {
@@ -132,7 +132,7 @@ impl Fit {
         let model = FitModel::new(source::model(&self.model)?)?;
         // of part of the sphere the brightest is not known
         let whole = self.input.view().is_none() && self.input.mask().is_none();
-        let lit = model.lights() > 0 && whole || self.lit.lobes() > 0;
+        let lit = model.lights() > 0 && whole || self.lit.lobes(model.lobes()) > 0;
         let config = self.settings.config(self.rendered.normals.is_some(), lit)?;
         report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
             self.one(&piped::input(path)?, outputs.get(at), &model, &config, report)
@@ -153,7 +153,8 @@ impl Fit {
             None => {
                 let (grid, view) = (self.settings.grid(picture.is_partial())?, self.input.view());
                 let most = self.lit.most(model.lights(), &picture, view.is_some(), report);
-                let lit = Lit::new(&picture, most, self.lit.widest()).map_err(|e| e.in_file(path))?;
+                let lit = Lit::new(&picture, most, LitArgs::widest(self.lit.lobes(model.lobes())))
+                    .map_err(|e| e.in_file(path))?;
                 let rest = lit.rest.as_ref().unwrap_or(&picture);
                 let observation = self.input.observe(rest, grid).map_err(|e| e.in_file(path))?;
                 let mut fitted = self.fit(path, &observation, model, config, report)?;
@@ -247,7 +248,7 @@ impl Fit {
         });
         progress.end();
         let mut best = best.map_err(|e| e.in_file(path))?;
-        if self.lit.lobes() > 0 {
+        if self.lit.lobes(model.lobes()) > 0 {
             best = self.lit.add_lobes(&best, &target, model, &config, report).map_err(|e| e.in_file(path))?;
         }
         let scores = match (partial, observation.clipped().is_some()) {

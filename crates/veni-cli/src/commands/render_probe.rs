@@ -152,7 +152,7 @@ impl RenderProbe {
         let (turn, grid) = (self.change.turn.to_radians(), scene.grid);
         let light = match &job.sky {
             Sky::File(path) => light::from_file(path, &self.layer, &self.model, grid, turn, report)?,
-            Sky::Seed(seed) => light::seeded(*seed, &self.model, grid, turn)?,
+            Sky::Seed(seed) => light::seeded(*seed, &self.model, grid, turn, report)?,
         };
         let factor = self.change.exposure.exp2() as f32;
         let radiance: Vec<_> = light.iter().map(|p| p.map(|v| v * factor)).collect();

@@ -121,7 +121,8 @@ impl Sample {
         };
         let files = self.latent_files(last, overwrite)?;
         let loaded = source::model(&self.decoding.model)?;
-        let Loaded { model, name } = &loaded;
+        loaded.note_random(report);
+        let Loaded { model, name, .. } = &loaded;
         model.config().decoder.check_folds().map_err(|e| e.in_file(name))?;
         let skies = RandomSkies::new(&loaded, self.asked.request(report)?)?;
         let device = Device::open(self.decoding.device, model, report)?;

@@ -40,8 +40,8 @@ pub(crate) struct Encoding<'a> {
 }
 
 impl<'a> Encoding<'a> {
-    /// With as many lights as the model's codes have, or as are asked for, and `lobes` lobes.
-    pub(crate) fn new(loaded: &'a Loaded, lights: Option<usize>, lobes: usize) -> Result<Self> {
+    /// With up to so many lights and lobes, or as many as codes of this model have.
+    pub(crate) fn new(loaded: &'a Loaded, lights: Option<usize>, lobes: Option<usize>) -> Result<Self> {
         if !loaded.model.has_encoder() {
             bail!(
                 "{}: this model has no encoder, it decodes only; name one that has with --model FILE",
@@ -49,7 +49,8 @@ impl<'a> Encoding<'a> {
             );
         }
         let encoder = Encoder::new(&loaded.model).map_err(|e| e.in_file(&loaded.name))?;
-        Ok(Self { loaded, encoder, lights: lights.unwrap_or(loaded.model.config().lights), lobes })
+        let lights = lights.unwrap_or(loaded.model.config().measured_lights());
+        Ok(Self { loaded, encoder, lights, lobes: lobes.unwrap_or(loaded.lobes) })
     }
 
     /// Reads, encodes, and decodes again to compare.

@@ -13,7 +13,7 @@ use veni_light::random::Stream;
 use veni_light::skies::SkyRequest;
 use veni_light::text::begins_object;
 
-use super::model::{Loaded, model};
+use super::model::{Loaded, model, name_of};
 use super::remembered::is_of_its_pixels;
 use crate::args::{Layer, ModelArgs};
 use crate::asked::request_in_words;
@@ -62,7 +62,9 @@ impl RandomSkies {
     }
 
     /// With nothing asked.
-    pub(crate) fn any(model: &Model) -> Self {
+    pub(crate) fn any(loaded: &Loaded, report: Report) -> Self {
+        loaded.note_random(report);
+        let model = &loaded.model;
         Self { prior: model.prior(), request: SkyRequest::default(), decoder: None, model: model.hash() }
     }
 
@@ -138,7 +140,7 @@ fn stored(path: &Path) -> Result<Option<Latent>> {
 }
 
 /// A latent means something only to the decoder that it was made for.
-fn check(latent: &Latent, Loaded { model, name }: &Loaded) -> Result<()> {
+fn check(latent: &Latent, Loaded { model, name, .. }: &Loaded) -> Result<()> {
     let (n, expected) = (latent.vectors.len(), model.latent_vectors());
     if n != expected {
         bail!("a latent of {n} vectors, but {name} has {expected}: name {}", owner(latent));
@@ -163,8 +165,8 @@ fn is_edited_of_another(path: &Path, latent: &Latent, model: &Model) -> Result<b
 fn owner(latent: &Latent) -> String {
     match inside(latent) {
         Some(own) if own.model.has_encoder() => {
-            let dimension = 3 * latent.vectors.len();
-            format!("its own model, which is inside this program, with --model {dimension}")
+            let name = name_of(own.model.latent_vectors());
+            format!("its own model, which is inside this program, with --model {name}")
         }
         Some(_) => "no model: its own is inside this program, and taken where none is named".to_owned(),
         None => "the latent's own model with --model FILE".to_owned(),
@@ -181,7 +183,7 @@ fn inside(latent: &Latent) -> Option<Loaded> {
     } else {
         format!("the earlier model of latent dimension {dimension} inside this program")
     };
-    Some(Loaded { model, name })
+    Some(Loaded { model, name, lobes: 0 })
 }
 
 #[cfg(not(feature = "pretrained"))]
@@ -194,7 +196,7 @@ fn is_cube_map(path: &Path) -> Result<bool> {
 }
 
 fn encode(path: &Path, layer: &Layer, loaded: &Loaded, why: &str, report: Report) -> Result<Latent> {
-    let encoded = super::encoding::Encoding::new(loaded, None, 0)?.encode_file(path, layer, report)?;
+    let encoded = super::encoding::Encoding::new(loaded, None, None)?.encode_file(path, layer, report)?;
     report.note(format_args!("{}: {why}; the panorama was encoded", path.display()));
     Ok(encoded.latent)
 }

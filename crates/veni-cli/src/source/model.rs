@@ -3,53 +3,102 @@
 use std::path::{Path, PathBuf};
 
 #[cfg(feature = "pretrained")]
-use anyhow::anyhow;
+use anyhow::Context;
 use anyhow::{Result, bail};
 use veni_light::model::Model;
 
 use crate::args::ModelArgs;
 use crate::piped;
+use crate::report::Report;
 
-/// A model and what to call it in messages.
+/// A model, what to call it in messages, and what its codes have beside vectors and lights.
 pub(crate) struct Loaded {
     pub(crate) model: Model,
     pub(crate) name: String,
+    /// The lobes of a panorama's code, unless another number is asked for.
+    pub(crate) lobes: usize,
 }
 
-/// The model of `--model`: a file, the folder of a training run, or one inside the program, by its latent dimension.
+impl Loaded {
+    /// Says that a random sky has none of the lobes that the chosen size is about.
+    pub(crate) fn note_random(&self, report: Report) {
+        if self.lobes > 0 {
+            report.note(format_args!(
+                "note: a random sky has no lobes, which describe the detail of a panorama; it is that of the model of latent dimension {}",
+                3 * self.model.latent_vectors()
+            ));
+        }
+    }
+}
+
+/// The model of `--model`: a file, the folder of a training run, or one inside the program, by its name.
 pub(crate) fn model(args: &ModelArgs) -> Result<Loaded> {
     let Some(path) = &args.model else {
         return embedded(SMALLEST);
     };
-    if let Some(dimension) = size(path) {
-        return embedded(dimension);
+    if let Some(name) = path.to_str().filter(|name| is_embedded_name(name) && !path.exists()) {
+        return embedded(name);
     }
     let path = piped::input(&model_file(path)?)?;
-    Ok(Loaded { model: Model::load(&path)?, name: path.display().to_string() })
+    Ok(Loaded { model: Model::load(&path)?, name: path.display().to_string(), lobes: 0 })
 }
 
-/// Latent dimension of the model that is taken where none is named.
-const SMALLEST: usize = 27;
+/// The name of the model that is taken where none is named.
+const SMALLEST: &str = "27";
 
-/// A latent dimension, not the name of a file or folder.
-fn size(path: &Path) -> Option<usize> {
-    path.to_str()?.parse().ok().filter(|_| !path.exists())
+/// A model inside the program, as `--model` names it.
+#[cfg(feature = "pretrained")]
+struct Embedded {
+    name: &'static str,
+    /// D = 3N of its vectors.
+    dimension: usize,
+    lobes: usize,
+}
+
+/// The models inside the program. The size of a code is 3N + 7M + 7K with N vectors, M lights (here one) and K lobes; docs/DECISIONS.md says why
+/// larger codes have lobes and not more vectors.
+#[cfg(feature = "pretrained")]
+const EMBEDDED: [Embedded; 5] = [
+    Embedded { name: "27", dimension: 27, lobes: 0 },
+    Embedded { name: "147", dimension: 27, lobes: 16 },
+    Embedded { name: "300", dimension: 27, lobes: 38 },
+    Embedded { name: VECTORS_147, dimension: 147, lobes: 0 },
+    Embedded { name: VECTORS_300, dimension: 300, lobes: 0 },
+];
+
+const VECTORS_147: &str = "vectors-147";
+const VECTORS_300: &str = "vectors-300";
+
+/// How `--model` names the model inside the program whose codes have `vectors` vectors.
+pub(super) fn name_of(vectors: usize) -> &'static str {
+    match vectors {
+        49 => VECTORS_147,
+        100 => VECTORS_300,
+        _ => SMALLEST,
+    }
+}
+
+/// The latent dimension of a model, or one of the two other names; not a file.
+fn is_embedded_name(name: &str) -> bool {
+    [VECTORS_147, VECTORS_300].contains(&name) || name.parse::<usize>().is_ok()
 }
 
 #[cfg(feature = "pretrained")]
-fn embedded(dimension: usize) -> Result<Loaded> {
-    let model = Model::pretrained_of(dimension).ok_or_else(|| {
-        let sizes: Vec<_> = Model::pretrained_sizes().map(|size| size.to_string()).collect();
-        anyhow!(
-            "--model {dimension}: this program has models of latent dimension {} inside",
-            sizes.join(", ")
-        )
-    })?;
-    Ok(Loaded { model, name: format!("the model of latent dimension {dimension} inside this program") })
+fn embedded(name: &str) -> Result<Loaded> {
+    let inside = |e: &&Embedded| Model::pretrained_sizes().any(|size| size == e.dimension);
+    let Some(found) = EMBEDDED.iter().filter(inside).find(|e| e.name == name) else {
+        let names: Vec<_> = EMBEDDED.iter().filter(inside).map(|e| e.name).collect();
+        bail!("--model {name}: this program has models {} inside", names.join(", "));
+    };
+    let dimension = found.dimension;
+    let model = Model::pretrained_of(dimension)
+        .with_context(|| format!("no model of latent dimension {dimension}"))?;
+    let name = format!("the model of latent dimension {dimension} inside this program");
+    Ok(Loaded { model, name, lobes: found.lobes })
 }
 
 #[cfg(not(feature = "pretrained"))]
-fn embedded(_: usize) -> Result<Loaded> {
+fn embedded(_: &str) -> Result<Loaded> {
     bail!("this build has no model inside: name a model file with --model FILE")
 }
 

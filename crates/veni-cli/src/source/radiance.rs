@@ -61,7 +61,7 @@ pub(crate) fn radiance(
     loaded.model.config().decoder.check_folds().map_err(|e| e.in_file(&loaded.name))?;
     let latent = match named {
         Named::File(path) => from_file(path, layer, &loaded, report)?,
-        Named::Seed(seed) => RandomSkies::any(&loaded.model).sky(seed)?,
+        Named::Seed(seed) => RandomSkies::any(&loaded, report).sky(seed)?,
     };
     let device = Device::open(decoding.device, &loaded.model, report)?;
     let panorama = Panorama::new(grid, device.condition(&latent)?.bake(grid)?);

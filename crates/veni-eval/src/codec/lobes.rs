@@ -1,4 +1,4 @@
-//! A model's vectors, one light and lobes, all fitted to each image: codes of more than the model's own dimension.
+//! A model's vectors, lights and lobes, all fitted to each image: codes of more than the model's own dimension.
 
 use serde_json::json;
 
@@ -18,11 +18,13 @@ const FITTED: usize = 128;
 /// The parameters of a lobe.
 const LOBE: usize = 7;
 
-/// A code of N vectors, as many lights as the model was trained without, and K lobes: as `veni-cli fit --lobes K` makes it.
+/// A code of N vectors, the lights that are measured, and K lobes.
 #[derive(Clone, Debug)]
 pub struct Lobed<'a> {
     subject: &'a LoadedModel,
     lobes: usize,
+    /// The encoder's vectors as they are, and lobes fitted to what they leave; otherwise all are fitted.
+    only_lobes: bool,
     config: FitConfig,
     pass: String,
 }
@@ -33,7 +35,18 @@ impl<'a> Lobed<'a> {
         let prior = FitConfig::prior_for(subject.latent_vectors());
         let config = FitConfig { prior, ..FitConfig::lit() };
         let config = if quick { config.in_steps(20) } else { config };
-        Self { subject, lobes, config, pass: format!("optimised, {lobes} lobes") }
+        Self { subject, lobes, only_lobes: false, config, pass: format!("optimised, {lobes} lobes") }
+    }
+
+    /// With the lobes of the model's own codes.
+    pub fn own(subject: &'a LoadedModel, quick: bool) -> Self {
+        Self { pass: "optimised".to_owned(), ..Self::new(subject, subject.lobes(), quick) }
+    }
+
+    /// The vectors as the encoder says them, the model's own number of lobes fitted to what they leave; if there is an encoder.
+    pub fn encoded(subject: &'a LoadedModel, quick: bool) -> Option<Self> {
+        let own = Self::own(subject, quick);
+        subject.veni().map(|_| Self { only_lobes: true, pass: "autoencoder".to_owned(), ..own })
     }
 }
 
@@ -47,7 +60,7 @@ impl Codec for Lobed<'_> {
     }
 
     fn dimension(&self) -> usize {
-        self.subject.dimension() + LIGHT * self.subject.model().config().lights + LOBE * self.lobes
+        self.subject.dimension() + LIGHT * self.subject.lights() + LOBE * self.lobes
     }
 
     fn key(&self) -> Canonical {
@@ -55,7 +68,7 @@ impl Codec for Lobed<'_> {
             self.subject,
             json!({
                 "model": self.subject.identity(),
-                "pass": "lobes",
+                "pass": if self.only_lobes { "encoder and lobes" } else { "lobes" },
                 "lobes": self.lobes,
                 "widest": WIDEST_LIGHT,
                 "fit": self.config,
@@ -75,8 +88,11 @@ impl Codec for Lobed<'_> {
         let prior = self.subject.prior();
         let target = FitTarget::panoramas(grid, &images)?.with_prior(&prior);
         let (decoder, start) = (self.subject.fit_decoder().as_dyn(), [Latent::new(vectors)]);
-        let begun = fit(decoder, &target, &start, &self.config)?.latents;
-        let plan = LobePlan { count: self.lobes, only_lobes: false };
+        let begun = match self.only_lobes {
+            true => start.to_vec(),
+            false => fit(decoder, &target, &start, &self.config)?.latents,
+        };
+        let plan = LobePlan { count: self.lobes, only_lobes: self.only_lobes };
         let found = fit_lobes(decoder, &target, &begun, plan, &self.config, &mut |_, _| {})?;
         let mut all: Vec<f32> = vec![rest.code.lights.len() as f32];
         let mut found: Vec<Latent> = found.into_iter().map(|(latent, _)| latent).collect();
@@ -130,7 +146,7 @@ mod tests {
         let error = |lobes: usize| {
             let codec = Lobed::new(&subject, lobes, true);
             let code = codec.encode(grid, &image).unwrap();
-            let own = codec.dimension() - LIGHT * subject.model().config().lights;
+            let own = codec.dimension() - LIGHT * subject.lights();
             // the count of lights, exposure and sun beside what counts
             assert!(code.len() >= own + 3, "{} of {own}", code.len());
             let decoded = codec.decode(grid, &code).unwrap();

@@ -60,7 +60,7 @@ impl Codec for Autoencoder<'_> {
     }
 
     fn dimension(&self) -> usize {
-        self.subject.dimension() + LIGHT * self.subject.model().config().lights
+        self.subject.dimension() + LIGHT * self.subject.lights()
     }
 
     fn key(&self) -> Canonical {
@@ -86,7 +86,7 @@ impl Codec for Optimised<'_> {
     }
 
     fn dimension(&self) -> usize {
-        self.subject.dimension() + LIGHT * self.subject.model().config().lights
+        self.subject.dimension() + LIGHT * self.subject.lights()
     }
 
     fn key(&self) -> Canonical {
@@ -130,8 +130,12 @@ impl Codec for Optimised<'_> {
 
 /// The key of a pass: codes with lights were at another exposure before, and are kept under that key.
 pub(super) fn exposed(subject: &LoadedModel, mut key: serde_json::Value) -> Canonical {
-    if subject.model().config().lights > 0 {
+    if subject.lights() > 0 {
         key["exposure"] = json!("surfaces");
+    }
+    // as many as the model was trained without, once the only number, are kept without it
+    if subject.lights() != subject.model().config().lights {
+        key["lights"] = json!(subject.lights());
     }
     Canonical::of(key)
 }

@@ -161,7 +161,8 @@ fn fits<'a>(run: &Evaluation<'a>, subject: &'a LoadedModel, half: Half) -> Work<
         protocol: "completion",
         name: format!("{}-{}-{}", item.name(), half.name(), subject.name()),
         decides: Canonical::of(json!({
-            "model": subject.identity(), "fit": settings.key(), "hidden": half.name(), "image": image,
+            "model": subject.identity(), "fit": settings.key(), "lights": subject.lights(),
+            "hidden": half.name(), "image": image,
         })),
     };
     let keys = items.iter().zip(images(run)).map(key).collect();

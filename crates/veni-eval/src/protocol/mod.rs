@@ -131,26 +131,32 @@ impl std::fmt::Debug for Evaluation<'_> {
     }
 }
 
+fn boxed<'a>(codec: impl Codec + 'a) -> Box<dyn Codec + 'a> {
+    Box::new(codec)
+}
+
 impl<'a> Evaluation<'a> {
     /// The models' passes that are compared: autoencoder where there is an encoder, optimised, and with each number of lobes.
     fn codecs(&self, subject: &'a LoadedModel) -> Vec<Box<dyn Codec + 'a>> {
         let fit = FitSettings::thorough(self.data.grid(), self.settings.quick);
-        let fit = if subject.model().config().lights > 0 { fit.lit() } else { fit };
-        let pass = Autoencoder::new(subject).map(|codec| Box::new(codec) as Box<dyn Codec>);
-        let with =
-            |count: &usize| Box::new(Lobed::new(subject, *count, self.settings.quick)) as Box<dyn Codec>;
-        let optimised = Box::new(Optimised::new(subject, fit)) as Box<dyn Codec>;
+        let fit = if subject.lights() > 0 { fit.lit() } else { fit };
+        let quick = self.settings.quick;
+        let with = |count: &usize| Box::new(Lobed::new(subject, *count, quick)) as Box<dyn Codec>;
+        let (pass, optimised): (_, Box<dyn Codec>) = match subject.lobes() {
+            0 => (Autoencoder::new(subject).map(boxed), boxed(Optimised::new(subject, fit))),
+            _ => (Lobed::encoded(subject, quick).map(boxed), boxed(Lobed::own(subject, quick))),
+        };
         pass.into_iter().chain([optimised]).chain(self.lobes.iter().map(with)).collect()
     }
 
     /// How the optimised pass fits, in words.
     fn optimised_note(&self) -> String {
         let fit = FitSettings::thorough(self.data.grid(), self.settings.quick);
-        let lit = self.subjects.iter().any(|subject| subject.model().config().lights > 0);
+        let lit = self.subjects.iter().any(|subject| subject.lights() > 0);
         let lit = if lit { " Models with lights in their codes: with an energy weight of 0.35." } else { "" };
-        let lobes = match self.lobes {
-            [] => "",
-            _ => {
+        let lobes = match self.lobes.is_empty() && self.subjects.iter().all(|subject| subject.lobes() == 0) {
+            true => "",
+            false => {
                 " With lobes: vectors and lobes at 128 columns, with an energy weight of 0.35, lights no wider than 1.5°."
             }
         };

@@ -30,6 +30,10 @@ impl Lights {
     /// The most lights that are taken out of one panorama.
     pub const MOST: usize = 8;
 
+    /// The most lights that are measured in a panorama unless somebody says otherwise: a sun, and what else is bright and small. Few
+    /// outdoor panoramas need more.
+    pub const USUAL: usize = 4;
+
     /// A sun, and other lights.
     pub fn new(sun: Option<CompactLight>, others: impl IntoIterator<Item = CompactLight>) -> Self {
         Self { has_sun: sun.is_some(), all: sun.into_iter().chain(others).collect() }

@@ -24,8 +24,8 @@ pub struct ModelConfig {
     /// The VN-ViT; absent in a decode-only model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub encoder: Option<EncoderConfig>,
-    /// Most compact lights of a code. That many are taken out of a panorama before the encoder and the losses see it:
-    /// the field describes what is left. 0: the paper's model, whose field holds everything.
+    /// The most compact lights that were taken out of a training panorama before the encoder and the losses saw it: the field describes
+    /// what is left. 0: the paper's model, whose field holds everything.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub lights: usize,
 }
@@ -40,6 +40,12 @@ impl ModelConfig {
     pub fn decode_only(latent_vectors: usize) -> Self {
         let decoder = DecoderConfig::default();
         Self { kind: ModelKind::Veni, latent_vectors, decoder, encoder: None, lights: 0 }
+    }
+
+    /// The most lights that are measured in a panorama that is encoded or fitted, unless somebody says otherwise: [`Lights::USUAL`], or as many
+    /// as the training panoramas lost if these are more; 0 where the field holds everything.
+    pub fn measured_lights(&self) -> usize {
+        if self.lights == 0 { 0 } else { self.lights.max(Lights::USUAL) }
     }
 
     /// Checks every size: positive, and small enough that products of sizes stay far from overflow and what is computed

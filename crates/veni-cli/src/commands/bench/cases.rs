@@ -1,7 +1,7 @@
 //! What is baked: the decoders to compare.
 
 use anyhow::{Result, anyhow};
-use veni_light::latent::Latent;
+use veni_light::latent::{Latent, Lobe};
 use veni_light::model::{Model, ModelConfig};
 
 use crate::args::ModelArgs;
@@ -17,15 +17,27 @@ pub(super) struct Case {
 }
 
 impl Case {
-    pub(super) fn new(name: impl Into<String>, model: Model) -> Self {
+    /// With a random latent, to which `lobes` lobes are added.
+    pub(super) fn new(name: impl Into<String>, model: Model, lobes: usize) -> Self {
         let latent = Latent::from_seed(&model.prior(), 1);
+        let latent = Latent { lobes: (0..lobes).map(|at| lobe(at, lobes)).collect(), ..latent };
         Self { name: name.into(), model, latent }
     }
 
-    /// Floating-point operations of the folded network for one direction.
+    /// Floating-point operations of the folded network for one direction, and of the lobes but for their exponentials.
     pub(super) fn operations(&self) -> f64 {
-        2.0 * multiply_adds(self.model.config()) as f64
+        // an angle's cosine, the exponent, three channels
+        let lobes = 7 * self.latent.lobes.len();
+        2.0 * (multiply_adds(self.model.config()) + lobes) as f64
     }
+}
+
+/// One of `count` lobes on a spiral from pole to pole (Fibonacci's), as wide as those of fitted panoramas.
+fn lobe(at: usize, count: usize) -> Lobe {
+    let z = 1.0 - (2.0 * at as f32 + 1.0) / count as f32;
+    let (sin, cos) = (at as f32 * std::f32::consts::PI * (3.0 - 5f32.sqrt())).sin_cos();
+    let radius = (1.0 - z * z).sqrt();
+    Lobe { direction: [radius * cos, radius * sin, z], amplitude: [0.5; 3], sharpness: 40.0 }
 }
 
 /// The model that was named, or the one inside, and one by formula for each number of latent vectors.
@@ -34,9 +46,9 @@ pub(super) fn all(args: &ModelArgs, latent_vectors: &[usize], report: Report) ->
     match (source::model(args), &args.model) {
         (Ok(loaded), Some(path)) => {
             let name = path.file_name().map_or(loaded.name, |name| name.to_string_lossy().into_owned());
-            cases.push(Case::new(name, loaded.model));
+            cases.push(Case::new(name, loaded.model, loaded.lobes));
         }
-        (Ok(loaded), None) => cases.push(Case::new("embedded", loaded.model)),
+        (Ok(loaded), None) => cases.push(Case::new("embedded", loaded.model, loaded.lobes)),
         (Err(error), Some(_)) => return Err(error),
         // a build without a model can still measure the others
         (Err(error), None) => report.note(format_args!("note: {error:#}")),
@@ -44,7 +56,7 @@ pub(super) fn all(args: &ModelArgs, latent_vectors: &[usize], report: Report) ->
     for n in latent_vectors {
         let model = Model::filler(&ModelConfig::decode_only(*n), 1)
             .map_err(|e| anyhow!("--latent-vectors {n}: {e}"))?;
-        cases.push(Case::new("formula", model));
+        cases.push(Case::new("formula", model, 0));
     }
     Ok(cases)
 }

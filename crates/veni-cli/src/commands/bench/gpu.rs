@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn a_panorama_goes_where_there_is_room_for_it() {
         let Some(found) = adapter() else { return };
-        let case = Case::new("formula", Model::filler(&ModelConfig::decode_only(2), 1).unwrap());
+        let case = Case::new("formula", Model::filler(&ModelConfig::decode_only(2), 1).unwrap(), 0);
         let mut loaded = Gpu::new(found).loaded(&case).unwrap();
         let grid = Equirect::new(32, 16);
         let row = 32 * PIXEL;

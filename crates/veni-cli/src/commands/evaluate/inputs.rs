@@ -35,7 +35,11 @@ pub(crate) enum BaselineName {
 }
 
 /// The models to compare, under distinct names.
-pub(super) fn subjects(models: &[String], device: DeviceKind) -> Result<Vec<LoadedModel>> {
+pub(super) fn subjects(
+    models: &[String],
+    lights: Option<u8>,
+    device: DeviceKind,
+) -> Result<Vec<LoadedModel>> {
     let given = if models.is_empty() {
         vec![("veni".to_owned(), None)]
     } else {
@@ -52,14 +56,32 @@ pub(super) fn subjects(models: &[String], device: DeviceKind) -> Result<Vec<Load
     let device = device.device()?;
     let load = |(name, path): (String, Option<PathBuf>)| {
         let loaded = source::model(&ModelArgs { model: path })?;
-        Ok(LoadedModel::new(name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?)
+        let subject = LoadedModel::new(name, loaded.model, &device).map_err(|e| e.in_file(&loaded.name))?;
+        let subject = subject.with_lobes(loaded.lobes);
+        // of models beside each other some may draw their lights themselves
+        let known = subject.model().config().lights > 0;
+        match lights.filter(|_| known) {
+            Some(lights) => Ok(subject.with_lights(usize::from(lights))?),
+            None => Ok(subject),
+        }
     };
-    given.into_iter().map(load).collect()
+    let subjects = given.into_iter().map(load).collect::<Result<Vec<_>>>()?;
+    if lights.is_some_and(|lights| lights > 0) && subjects.iter().all(|subject| subject.lights() == 0) {
+        bail!(
+            "--compact-lights: these models were trained on panoramas with their lights, which they draw; leave it out"
+        );
+    }
+    Ok(subjects)
 }
 
 /// The bases asked for, of each size that a model has.
 pub(super) fn bases(names: &[BaselineName], subjects: &[LoadedModel]) -> Result<Vec<Basis>> {
-    let mut sizes: Vec<_> = subjects.iter().map(LoadedModel::dimension).collect();
+    // with one light where there are lobes, as the sizes of codes inside the program are counted
+    let size = |subject: &LoadedModel| match subject.lobes() {
+        0 => subject.dimension(),
+        lobes => subject.dimension() + 7 * (1 + lobes),
+    };
+    let mut sizes: Vec<_> = subjects.iter().map(size).collect();
     sizes.sort_unstable();
     sizes.dedup();
     let mut bases = Vec::new();

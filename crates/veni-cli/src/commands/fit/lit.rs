@@ -16,14 +16,14 @@ use crate::report::Report;
 #[derive(Args, Debug)]
 pub(super) struct LitArgs {
     /// Take up to N compact lights (the sun, lamps) out of what is known of a panorama of high dynamic range before the fit, and put
-    /// them into the latent [default: as many as the model was trained without]
+    /// them into the latent [default: 4 with a model that was trained without lights, otherwise 0]
     #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=8), conflicts_with_all = ["fov", "normals"])]
     compact_lights: Option<u8>,
 
     /// Add K spherical Gaussians to the latent, which fit what its vectors leave of the picture, and the vectors with them: detail
-    /// of 7 numbers each. Lights are then no wider than 1.5°
-    #[arg(long, value_name = "K", default_value_t = 0, hide_default_value = true, value_parser = value_parser!(u16).range(0..=256), conflicts_with = "normals")]
-    lobes: u16,
+    /// of 7 numbers each. Lights are then no wider than 1.5° [default: those of --model 147 and 300, 16 and 38, else 0]
+    #[arg(long, value_name = "K", value_parser = value_parser!(u16).range(0..=256), conflicts_with = "normals")]
+    lobes: Option<u16>,
 
     /// Of a photograph or part of a panorama that does not show the sun: put the sun into the latent that the model thinks most
     /// likely given what is seen, if it thinks that there is one at all
@@ -32,17 +32,17 @@ pub(super) struct LitArgs {
 }
 
 impl LitArgs {
-    /// The number of lobes that are added.
-    pub(super) fn lobes(&self) -> usize {
-        usize::from(self.lobes)
+    /// The number of lobes that are added, `usual` unless somebody said otherwise.
+    pub(super) fn lobes(&self, usual: usize) -> usize {
+        self.lobes.map_or(usual, usize::from)
     }
 
-    /// The angular radius of the widest light, radians.
-    pub(super) fn widest(&self) -> f32 {
-        if self.lobes > 0 { WIDEST_LIGHT } else { std::f32::consts::PI }
+    /// The angular radius of the widest light beside so many lobes, radians.
+    pub(super) fn widest(lobes: usize) -> f32 {
+        if lobes > 0 { WIDEST_LIGHT } else { std::f32::consts::PI }
     }
 
-    /// The number of lights that are looked for in a picture, where a model was trained without `usual`: none in a photograph
+    /// The number of lights that are looked for in a picture, `usual` unless somebody said otherwise: none in a photograph
     /// (`view`), nor where values are cut off.
     pub(super) fn most(&self, usual: usize, picture: &Picture, view: bool, report: Report) -> usize {
         let [width, height] = picture.size();
@@ -65,7 +65,7 @@ impl LitArgs {
         config: &FitConfig,
         report: Report,
     ) -> Result<Best> {
-        let plan = LobePlan { count: self.lobes(), only_lobes: false };
+        let plan = LobePlan { count: self.lobes(model.lobes()), only_lobes: false };
         let progress = ProgressBars::new(report);
         progress.begin("lobes", "start", Some(best.all.len() as u64));
         let one = |latent: &Latent| {

@@ -17,6 +17,7 @@ use crate::source::Loaded;
 pub(super) struct FitModel {
     name: String,
     model: Model,
+    lobes: usize,
     encoder: Option<Encoder>,
     decoder: Decoder,
 }
@@ -30,13 +31,13 @@ enum Decoder {
 
 impl FitModel {
     pub(super) fn new(loaded: Loaded) -> Result<Self> {
-        let Loaded { model, name } = loaded;
+        let Loaded { model, name, lobes } = loaded;
         let decoder = decoder(&model).map_err(|e| e.in_file(&name))?;
         let encoder = match model.has_encoder() {
             true => Some(Encoder::new(&model).map_err(|e| e.in_file(&name))?),
             false => None,
         };
-        Ok(Self { name, model, encoder, decoder })
+        Ok(Self { name, model, lobes, encoder, decoder })
     }
 
     pub(super) fn name(&self) -> &str {
@@ -51,9 +52,14 @@ impl FitModel {
         self.model.prior()
     }
 
-    /// The number of lights that were taken out of the panoramas that it was trained on.
+    /// The most lights that are measured in a panorama, unless somebody says otherwise.
     pub(super) fn lights(&self) -> usize {
-        self.model.config().lights
+        self.model.config().measured_lights()
+    }
+
+    /// The lobes of a picture's code, unless another number is asked for.
+    pub(super) fn lobes(&self) -> usize {
+        self.lobes
     }
 
     pub(super) fn latent_vectors(&self) -> usize {

@@ -72,10 +72,20 @@ fn described(light: &CompactLight, log_exposure: f32) -> Value {
 pub(super) fn summary(latent: &Latent) -> String {
     let of = latent.model.as_ref().map(|m| format!(" of model {m}")).unwrap_or_default();
     let from = latent.source.as_ref().map(|s| format!(", from {s}")).unwrap_or_default();
-    let lights = match latent.lights.len() {
-        0 => String::new(),
-        1 => " and a light".to_owned(),
-        m => format!(" and {m} lights"),
+    let counted = |count: usize, one: &str, many: &str| match count {
+        0 => None,
+        1 => Some(one.to_owned()),
+        m => Some(format!("{m} {many}")),
     };
-    format!("{} vectors{lights}{of}{from}", latent.vectors.len())
+    let parts = [
+        Some(format!("{} vectors", latent.vectors.len())),
+        counted(latent.lights.len(), "a light", "lights"),
+        counted(latent.lobes.len(), "a lobe", "lobes"),
+    ];
+    let parts: Vec<_> = parts.into_iter().flatten().collect();
+    let all = match &parts[..] {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        _ => parts.concat(),
+    };
+    format!("{all}{of}{from}")
 }

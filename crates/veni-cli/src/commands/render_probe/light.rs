@@ -33,9 +33,15 @@ pub(super) fn from_file(
 }
 
 /// The same of a random sky.
-pub(super) fn seeded(seed: u64, model: &ModelArgs, grid: Equirect, turn: f64) -> Result<Vec<[f32; 3]>> {
+pub(super) fn seeded(
+    seed: u64,
+    model: &ModelArgs,
+    grid: Equirect,
+    turn: f64,
+    report: Report,
+) -> Result<Vec<[f32; 3]>> {
     let loaded = source::model(model)?;
-    let latent = source::RandomSkies::any(&loaded.model).sky(seed)?;
+    let latent = source::RandomSkies::any(&loaded, report).sky(seed)?;
     decode(&loaded, &latent, grid, turn)
 }
 
