@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::Codec;
-use super::model::{LIGHT, code, exposed, latent};
+use super::model::{LIGHT, code, exposed, latent, named};
 use crate::Result;
 use crate::canonical::Canonical;
 use crate::fitting::dividing;
@@ -11,6 +11,7 @@ use veni_core::LoadedModel;
 use veni_data::coarsen::{averaged, coarse_grid};
 use veni_fit::{FitConfig, FitTarget, LobePlan, WIDEST_LIGHT, fit, fit_lobes};
 use veni_light::latent::{Latent, Lobe};
+use veni_light::light::Lights;
 use veni_light::sphere::Equirect;
 
 /// Columns of the panorama at which vectors and lobes are fitted, as `veni-cli fit` does it; lights are measured at the panorama's own.
@@ -112,6 +113,16 @@ impl Codec for Lobed<'_> {
     }
 
     fn decode(&self, grid: Equirect, values: &[f32]) -> Result<Vec<f32>> {
+        Ok(self.subject.decode(grid, &[self.latent(values)])?.concat())
+    }
+
+    fn lights(&self, values: &[f32]) -> Option<Lights> {
+        named(self.subject, &self.latent(values))
+    }
+}
+
+impl Lobed<'_> {
+    fn latent(&self, values: &[f32]) -> Latent {
         let lights = values.first().map_or(0, |count| *count as usize);
         let (plain, lobes) = values[1..].split_at(3 * self.subject.latent_vectors() + 2 + LIGHT * lights);
         let lobe = |n: &[f32; LOBE]| Lobe {
@@ -120,14 +131,16 @@ impl Codec for Lobed<'_> {
             sharpness: n[6],
         };
         let lobes = lobes.as_chunks().0.iter().map(lobe).collect();
-        Ok(self.subject.decode(grid, &[Latent { lobes, ..latent(self.subject, plain) }])?.concat())
+        Latent { lobes, ..latent(self.subject, plain) }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::codec::Autoencoder;
     use veni_core::train::config::DeviceKind;
+    use veni_light::light::CompactLight;
     use veni_light::model::Model;
 
     #[test]
@@ -156,5 +169,28 @@ mod tests {
         let [none, some, many] = [0, 4, 12].map(error);
         assert!(some < 0.8 * none && many < some, "{none}, {some} and {many}");
         assert_ne!(Lobed::new(&subject, 4, true).key(), Lobed::new(&subject, 5, true).key());
+    }
+
+    #[test]
+    fn codes_name_the_lights_that_they_were_given() {
+        let grid = Equirect::new(128, 64);
+        let sun = CompactLight::new([0.6, 0.0, 0.8], [9.0, 8.0, 7.0], CompactLight::SUN_RADIUS);
+        let mut sky: Vec<[f32; 3]> = grid.directions().iter().map(|d| [0.5 + 0.2 * d[2]; 3]).collect();
+        sun.add_to(grid, &mut sky);
+        let image: Vec<f32> = sky.iter().flatten().map(|v| v.ln()).collect();
+        let device = DeviceKind::Flex.device().unwrap();
+        let subject = LoadedModel::new("27", Model::pretrained(), &device).unwrap();
+        let encoder = Autoencoder::new(&subject).unwrap();
+        let lobed = Lobed::new(&subject, 2, true);
+        for codec in [&encoder as &dyn Codec, &lobed] {
+            let lights = codec.lights(&codec.encode(grid, &image).unwrap()).unwrap();
+            let found = lights.sun().unwrap();
+            let cosine: f32 = found.direction.iter().zip(sun.direction).map(|(a, b)| a * b).sum();
+            assert!(cosine > 2f32.to_radians().cos(), "{:?}", found.direction);
+            assert!(found.irradiance.iter().zip(sun.irradiance).all(|(a, b)| (a / b - 1.0).abs() < 0.03));
+        }
+        let blind = subject.clone().with_lights(0).unwrap();
+        let plain = Autoencoder::new(&blind).unwrap();
+        assert!(plain.lights(&plain.encode(grid, &image).unwrap()).is_none());
     }
 }

@@ -13,6 +13,7 @@ pub use model::{Autoencoder, Optimised};
 
 use crate::Result;
 use crate::canonical::Canonical;
+use veni_light::light::Lights;
 use veni_light::sphere::Equirect;
 
 /// A way to code a panorama at latent dimension D and to get it back.
@@ -41,4 +42,10 @@ pub trait Codec: Sync {
     /// # Errors
     /// What the system says, naming itself.
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>>;
+
+    /// The compact lights that a code names, in units of what it decodes to. None: this system's codes name none, and lights have to
+    /// be looked for in the pixels.
+    fn lights(&self, _code: &[f32]) -> Option<Lights> {
+        None
+    }
 }

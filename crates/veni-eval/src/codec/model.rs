@@ -74,6 +74,10 @@ impl Codec for Autoencoder<'_> {
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>> {
         Ok(self.subject.decode(grid, &[latent(self.subject, code)])?.concat())
     }
+
+    fn lights(&self, code: &[f32]) -> Option<Lights> {
+        named(self.subject, &latent(self.subject, code))
+    }
 }
 
 impl Codec for Optimised<'_> {
@@ -126,6 +130,15 @@ impl Codec for Optimised<'_> {
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>> {
         Ok(self.subject.decode(grid, &[latent(self.subject, code)])?.concat())
     }
+
+    fn lights(&self, code: &[f32]) -> Option<Lights> {
+        named(self.subject, &latent(self.subject, code))
+    }
+}
+
+/// The lights of a latent, exposure included, if codes of the model have any.
+pub(super) fn named(subject: &LoadedModel, latent: &Latent) -> Option<Lights> {
+    (subject.lights() > 0).then(|| latent.lights.scaled(latent.log_exposure.exp()))
 }
 
 /// The key of a pass: codes with lights were at another exposure before, and are kept under that key.

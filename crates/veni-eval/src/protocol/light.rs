@@ -2,10 +2,12 @@
 //!
 //! *Irradiance*: E on surfaces facing 26 ways ([`ways`]), luminance, of the decoded panorama against the panorama's own. The
 //! error of a panorama is √⟨(ln E/E_true)²⟩ over the ways; aligned, ⟨ln E/E_true⟩ is taken out first, as one exposure would.
-//! *Sun*: [`Light`](veni_light::light::Light) looks for one in both, at the resolution of the evaluation: the angle between the two,
-//! |ln| of the ratio of their irradiances, and how many panoramas have one in one of the two only.
+//! *Sun*: that of the code, where a system's codes name their lights, as [`Light::of_field`](veni_light::light::Light::of_field) gives it to
+//! renderers; otherwise [`Light`](veni_light::light::Light) looks for one in the decoded pixels, as it does in the panorama's own at the
+//! resolution of the evaluation. The angle between the two, |ln| of the ratio of their irradiances, and how many panoramas have one in one of
+//! the two only.
 
-use super::quality::reconstruct;
+use super::quality::{codes, reconstruct};
 use super::{Evaluation, Report, reconstruction};
 use crate::Result;
 use crate::codec::Codec;
@@ -67,7 +69,8 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     run.others.iter().try_for_each(|codec| add(run, *codec, &mut all, &mut each))?;
     all.note(
         "E error: root mean square of ln E/E_true over surfaces facing 26 ways, over all panoramas; median and worst of the \
-         panoramas; aligned: at the best exposure of each. Sun: over the panoramas with one in both.",
+         panoramas; aligned: at the best exposure of each. Sun: over the panoramas with one in both; that of the code where codes \
+         name their lights, otherwise looked for in the decoded pixels.",
     );
     all.note(run.optimised_note());
     Ok(Report { tables: vec![all], details: vec![each], ..Report::default() })
@@ -84,7 +87,14 @@ pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
 fn add(run: &Evaluation<'_>, codec: &dyn Codec, all: &mut Table, each: &mut Table) -> Result<()> {
     let (grid, items) = (run.data.grid(), run.data.items());
     let images = reconstruct(run, codec)?.images;
-    let lit = parallel(items.len(), |at| compare(grid, &images[at], &items[at].log_radiance))?;
+    let codes = codes(run, codec)?;
+    let lit = parallel(items.len(), |at| {
+        let found = match codec.lights(&codes[at]) {
+            Some(lights) => lights.sun().copied(),
+            None => sun(grid, &images[at])?,
+        };
+        compare_with(grid, &images[at], &items[at].log_radiance, found)
+    })?;
     let label = format!("{}, {}", codec.system(), codec.pass());
     for (item, lit) in items.iter().zip(&lit) {
         each.push(row(item, &label, lit));
@@ -159,14 +169,19 @@ fn median(sorted: &[f64]) -> Option<f64> {
     Some(0.5 * (sorted.get(half.checked_sub(1)?)? + sorted.get(half)?))
 }
 
-/// Log radiance decoded against that of the panorama.
+/// Log radiance decoded against that of the panorama; suns are looked for in both.
 pub(super) fn compare(grid: Equirect, decoded: &[f32], truth: &[f32]) -> Result<Lit> {
+    compare_with(grid, decoded, truth, sun(grid, decoded)?)
+}
+
+/// [`compare`] where the decoded sun is known.
+fn compare_with(grid: Equirect, decoded: &[f32], truth: &[f32], found: Option<CompactLight>) -> Result<Lit> {
     let logs = ratios(grid, decoded, truth);
     let level = mean(logs.iter().copied());
     Ok(Lit {
         error: mean(logs.iter().map(|l| l * l)).sqrt(),
         aligned: mean(logs.iter().map(|l| (l - level).powi(2))).sqrt(),
-        sun: between(sun(grid, truth)?, sun(grid, decoded)?),
+        sun: between(sun(grid, truth)?, found),
     })
 }
 
