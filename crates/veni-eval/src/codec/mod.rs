@@ -43,8 +43,7 @@ pub trait Codec: Sync {
     /// What the system says, naming itself.
     fn decode(&self, grid: Equirect, code: &[f32]) -> Result<Vec<f32>>;
 
-    /// The compact lights that a code names, in units of what it decodes to. None: this system's codes name none, and lights have to
-    /// be looked for in the pixels.
+    /// The compact lights that a code names, in units of what it decodes to. None: this system's codes name none.
     fn lights(&self, _code: &[f32]) -> Option<Lights> {
         None
     }

@@ -2,7 +2,7 @@
 //!
 //! *Irradiance*: E on surfaces facing 26 ways ([`ways`]), luminance, of the decoded panorama against the panorama's own. The
 //! error of a panorama is √⟨(ln E/E_true)²⟩ over the ways; aligned, ⟨ln E/E_true⟩ is taken out first, as one exposure would.
-//! *Sun*: that of the code, where a system's codes name their lights, as [`Light::of_field`](veni_light::light::Light::of_field) gives it to
+//! *Sun*: that of the code, where it names one, as [`Light::of_field`](veni_light::light::Light::of_field) gives it to
 //! renderers; otherwise [`Light`](veni_light::light::Light) looks for one in the decoded pixels, as it does in the panorama's own at the
 //! resolution of the evaluation. The angle between the two, |ln| of the ratio of their irradiances, and how many panoramas have one in one of
 //! the two only.
@@ -69,8 +69,8 @@ pub fn run(run: &Evaluation<'_>) -> Result<Report> {
     run.others.iter().try_for_each(|codec| add(run, *codec, &mut all, &mut each))?;
     all.note(
         "E error: root mean square of ln E/E_true over surfaces facing 26 ways, over all panoramas; median and worst of the \
-         panoramas; aligned: at the best exposure of each. Sun: over the panoramas with one in both; that of the code where codes \
-         name their lights, otherwise looked for in the decoded pixels.",
+         panoramas; aligned: at the best exposure of each. Sun: over the panoramas with one in both; that of the code where it \
+         names one, otherwise looked for in the decoded pixels.",
     );
     all.note(run.optimised_note());
     Ok(Report { tables: vec![all], details: vec![each], ..Report::default() })
@@ -89,10 +89,8 @@ fn add(run: &Evaluation<'_>, codec: &dyn Codec, all: &mut Table, each: &mut Tabl
     let images = reconstruct(run, codec)?.images;
     let codes = codes(run, codec)?;
     let lit = parallel(items.len(), |at| {
-        let found = match codec.lights(&codes[at]) {
-            Some(lights) => lights.sun().copied(),
-            None => sun(grid, &images[at])?,
-        };
+        let named = codec.lights(&codes[at]).and_then(|lights| lights.sun().copied());
+        let found = named.map_or_else(|| sun(grid, &images[at]), |sun| Ok(Some(sun)))?;
         compare_with(grid, &images[at], &items[at].log_radiance, found)
     })?;
     let label = format!("{}, {}", codec.system(), codec.pass());

@@ -161,8 +161,9 @@ impl Light {
         LightOptions::default().split(map.grid(), map.pixels().to_vec())
     }
 
-    /// The light of a field, decoded at `width` × `width`/2 pixels. The lights of a code are known and are not looked for; one
-    /// without is decoded and searched.
+    /// The light of a field, decoded at `width` × `width`/2 pixels. The lights of a code are known and are not looked for. Where the sun
+    /// is not among them it may be something that the field itself draws, lobes that a glow through cloud became: what is left is then
+    /// searched for one, and for as many others as there may be.
     ///
     /// # Errors
     /// [`Error`] of kind `Invalid` if the width is odd or less than 2, or the field decodes to what is not finite.
@@ -174,8 +175,14 @@ impl Light {
         if field.lights().is_empty() {
             return LightOptions::default().of_pixels(grid, field.bake(grid));
         }
-        let none = LightOptions { lights: 0, ..LightOptions::default() };
-        Ok(none.of_pixels(grid, field.without_lights().bake(grid))?.with(field.lights().clone()))
+        let known = field.lights();
+        let unknown = if known.sun().is_some() { 0 } else { Lights::MOST.saturating_sub(known.len()) };
+        let options = LightOptions { lights: unknown, ..LightOptions::default() };
+        let rest = options.of_pixels(grid, field.without_lights().bake(grid))?;
+        let mut others: Vec<_> = known.others().iter().chain(rest.lights.others()).copied().collect();
+        others.sort_by(|a, b| luminance(b.irradiance).total_cmp(&luminance(a.irradiance)));
+        let lights = Lights::new(known.sun().or(rest.lights.sun()).copied(), others);
+        Ok(rest.with(lights))
     }
 
     /// A light that is split already: what is left without a sun, and the sun.

@@ -3,6 +3,8 @@
 use std::f32::consts::PI;
 
 use super::*;
+use crate::latent::{Latent, Lobe};
+use crate::model::{Model, ModelConfig};
 use crate::sphere::Equirect;
 
 fn direction(azimuth: f32, elevation: f32) -> [f32; 3] {
@@ -360,4 +362,33 @@ fn tiny_maps_are_taken_as_they_are() {
             "{width} × {height}"
         );
     }
+}
+
+#[test]
+fn a_sun_that_a_field_draws_is_found_beside_the_lamps_of_its_code() {
+    let decoder = Model::filler(&ModelConfig::decode_only(2), 1).unwrap().decoder().unwrap();
+    let lamp = disc(direction(140.0, -15.0), 1.0, [0.1; 3]);
+    // a sun through haze: radiance 3000 times the sky's over 4°
+    let haze = Lobe { direction: direction(-20.0, 40.0), amplitude: [8.0; 3], sharpness: 1500.0 };
+    let latent = Latent {
+        lobes: vec![haze],
+        lights: Lights::new(None, [lamp]),
+        ..Latent::new(vec![[0.3, 0.1, 0.2], [0.0, 0.2, -0.1]])
+    };
+    let of = |latent: &Latent| Light::of_field(&decoder.condition(latent).unwrap(), 512).unwrap();
+    let light = of(&latent);
+    let sun = light.sun().expect("a sun");
+    assert!(degrees(sun.direction, haze.direction) < 0.5, "{:?}", sun.direction);
+    // the lamp is the code's, to the bit
+    assert!(light.lights().others().contains(&lamp), "{:?}", light.lights());
+    // no light is lost or counted twice
+    let whole = decoder.condition(&latent).unwrap().bake(light.grid);
+    let total = EnvironmentMap::new(light.grid, &whole).unwrap().integral()[1];
+    let lights: f64 = light.lights().iter().map(|l| f64::from(l.irradiance[1])).sum();
+    let sum = light.residual().integral()[1] + lights;
+    assert!((sum / total - 1.0).abs() < 1e-3, "{sum} of {total}");
+    // a sun of the code is the sun
+    let known = disc(direction(60.0, 30.0), 0.27, [5.0; 3]);
+    let light = of(&Latent { lights: Lights::new(Some(known), [lamp]), ..latent });
+    assert_eq!((light.sun(), light.lights().len()), (Some(&known), 2));
 }
