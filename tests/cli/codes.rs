@@ -173,7 +173,7 @@ fn sizes_name_lobes() {
     let lobes = |name: &str| Latent::load(dir.path(name)).unwrap().lobes.len();
     assert_eq!(["27.json", "147.json", "2.json"].map(lobes), [0, 16, 2]);
     let said = dir.ok(&["inspect", "encoded.exr"]);
-    assert!(said.contains("and 16 lobes of model"), "{said}");
+    assert!(said.contains("vectors, the sun, 16 lobes of model"), "{said}");
     // a code belongs to the model of its vectors, whichever size it was named by
     dir.ok(&["bake", "147.json", "--size", "16", "-o", "a.exr", "--float"]);
     dir.ok(&["bake", "147.json", "--model", "300", "--size", "16", "-o", "b.exr", "--float"]);

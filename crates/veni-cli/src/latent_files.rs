@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
+use veni_light::latent::Latent;
 use veni_light::output::Overwrite;
 
 use crate::output::{check, check_distinct, create_folder, named, refuse_existing};
@@ -65,4 +66,20 @@ impl LatentFiles {
 pub(crate) fn source_of(path: &Path) -> String {
     let path = piped::name(path);
     path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// What a code has: "9 vectors, the sun, a light, 38 lobes".
+pub(crate) fn in_words(latent: &Latent) -> String {
+    let counted = |count: usize, one: &str, many: &str| match count {
+        0 => None,
+        1 => Some(one.to_owned()),
+        count => Some(format!("{count} {many}")),
+    };
+    let parts = [
+        Some(format!("{} vectors", latent.vectors.len())),
+        latent.lights.sun().map(|_| "the sun".to_owned()),
+        counted(latent.lights.others().len(), "a light", "lights"),
+        counted(latent.lobes.len(), "a lobe", "lobes"),
+    ];
+    parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

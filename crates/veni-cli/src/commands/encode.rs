@@ -12,7 +12,7 @@ use veni_light::output::Overwrite;
 use veni_light::sphere::Equirect;
 
 use crate::args::{Force, Layer, ModelArgs};
-use crate::latent_files::LatentFiles;
+use crate::latent_files::{LatentFiles, in_words};
 use crate::output::{self, with_remedy};
 use crate::piped;
 use crate::printable::printable_json;
@@ -155,21 +155,12 @@ fn print(path: &Path, output: Option<&PathBuf>, encoded: &Encoded, report: Repor
     }
     match output {
         Some(output) => {
-            let (n, psnr) = (encoded.latent.vectors.len(), encoded.scores.ldr_psnr);
+            let psnr = encoded.scores.ldr_psnr;
             let stops = encoded.latent.log_exposure / std::f32::consts::LN_2;
-            let lights = match (encoded.latent.lights.sun(), encoded.latent.lights.others().len()) {
-                (None, 0) => String::new(),
-                (Some(_), 0) => ", the sun".to_owned(),
-                (None, others) => format!(", {others} lights"),
-                (Some(_), others) => format!(", the sun and {others} lights"),
-            };
-            let lobes = match encoded.latent.lobes.len() {
-                0 => String::new(),
-                lobes => format!(", {lobes} lobes"),
-            };
             let human = format!(
-                "{}: {n} vectors{lights}{lobes}, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB",
-                output.display()
+                "{}: {}, exposure {stops:+.2} stops, LDR PSNR {psnr:.1} dB",
+                output.display(),
+                in_words(&encoded.latent)
             );
             report.result(human, &())
         }

@@ -23,7 +23,7 @@ use veni_light::latent::Latent;
 use veni_light::output::Overwrite;
 
 use crate::args::{Force, ModelArgs};
-use crate::latent_files::{LatentFiles, source_of};
+use crate::latent_files::{LatentFiles, in_words, source_of};
 use crate::output::with_remedy;
 use crate::piped;
 use crate::printable::printable_json;
@@ -359,11 +359,7 @@ impl Fit {
         let Some(output) = output else {
             return lines_to_stdout(&format!("{}\n", printable_json(&text)));
         };
-        let (n, stops) = (best.latent.vectors.len(), best.latent.log_exposure / std::f32::consts::LN_2);
-        let lobes = match best.latent.lobes.len() {
-            0 => String::new(),
-            lobes => format!(", {lobes} lobes"),
-        };
+        let stops = best.latent.log_exposure / std::f32::consts::LN_2;
         let quality = match (scores, known) {
             (Some(s), _) => format!("LDR PSNR {:.1} dB", s.ldr_psnr),
             (None, Some(known)) => format!("{:.0} % of the sphere known", 100.0 * known),
@@ -373,8 +369,9 @@ impl Fit {
         let starts = if count > 1 { format!(", best of {count} starts") } else { String::new() };
         report.result(
             format!(
-                "{}: {n} vectors{lobes}, exposure {stops:+.2} stops, loss {:.4}, {quality}{starts} ({seconds:.1} s)",
+                "{}: {}, exposure {stops:+.2} stops, loss {:.4}, {quality}{starts} ({seconds:.1} s)",
                 output.display(),
+                in_words(&best.latent),
                 best.loss
             ),
             &(),

@@ -8,6 +8,7 @@ use veni_light::latent::Latent;
 use veni_light::light::CompactLight;
 
 use super::facts::Facts;
+use crate::latent_files::in_words;
 
 pub(super) fn describe(path: &Path) -> Result<Facts> {
     let latent = Latent::load(path)?;
@@ -72,20 +73,5 @@ fn described(light: &CompactLight, log_exposure: f32) -> Value {
 pub(super) fn summary(latent: &Latent) -> String {
     let of = latent.model.as_ref().map(|m| format!(" of model {m}")).unwrap_or_default();
     let from = latent.source.as_ref().map(|s| format!(", from {s}")).unwrap_or_default();
-    let counted = |count: usize, one: &str, many: &str| match count {
-        0 => None,
-        1 => Some(one.to_owned()),
-        m => Some(format!("{m} {many}")),
-    };
-    let parts = [
-        Some(format!("{} vectors", latent.vectors.len())),
-        counted(latent.lights.len(), "a light", "lights"),
-        counted(latent.lobes.len(), "a lobe", "lobes"),
-    ];
-    let parts: Vec<_> = parts.into_iter().flatten().collect();
-    let all = match &parts[..] {
-        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
-        _ => parts.concat(),
-    };
-    format!("{all}{of}{from}")
+    format!("{}{of}{from}", in_words(latent))
 }
