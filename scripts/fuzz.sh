@@ -48,10 +48,13 @@ guided() {
     binary=$(find "$work" -path "*release/$name" -type f | head -1)
     mkdir -p "$work/corpus/$name" "$work/artifacts/$name"
     before=$(find "$work/artifacts/$name" -type f | wc -l)
+    # re_rav1d leaks 48 bytes of each picture (docs/UPSTREAM.md)
+    local leaks=()
+    [[ $name != avif ]] || leaks=(-detect_leaks=0)
     while ((left > 0)); do
         begin=$SECONDS
         "$binary" "$work/corpus/$name" "$work/seeds/$name" -artifact_prefix="$work/artifacts/$name/" -max_len=65536 \
-            -timeout=10 -rss_limit_mb=1229 -max_total_time="$left" -print_final_stats=1 >"$log" 2>&1 || true
+            -timeout=10 -rss_limit_mb=1229 "${leaks[@]}" -max_total_time="$left" -print_final_stats=1 >"$log" 2>&1 || true
         value() { sed -n "s/^stat::$1: *//p; \$a 0" "$log" | sort -n | tail -1; }
         inputs=$((inputs + $(value number_of_executed_units)))
         memory=$(printf '%s\n' "$memory" "$(value peak_rss_mb)" | sort -n | tail -1)

@@ -239,3 +239,33 @@ fn wrong_usage_is_explained() {
         &["300x100", "300x150"],
     );
 }
+
+#[test]
+fn what_is_replaced_is_said() {
+    let dir = Dir::new();
+    let write = |name: &str, bad: f32| {
+        let value = |x: usize, y: usize| if (x, y) == (3, 4) { bad } else { 1.0 + x as f32 };
+        exr::prelude::write_rgb_file(dir.path(name), 16, 8, |x, y| (value(x, y), 1.0, 1.0)).unwrap();
+    };
+    let said = |command: &[&str]| {
+        let run = dir.run(&[command, &["-o", "z.json", "--model", model(), "--force"]].concat());
+        assert_eq!(run.code, Some(0), "{}", run.err);
+        run.err
+    };
+    for (name, bad, encoded, fitted) in [
+        ("ringing.exr", -0.25, "1 negative values were replaced", "1 negative values count as black"),
+        ("hole.exr", f32::NAN, "1 values that are not a number", "1 pixels are not numbers"),
+        ("dark.exr", 0.0, "", ""),
+    ] {
+        write(name, bad);
+        for (command, says) in [(&["encode", name][..], encoded), (&["fit", name, "--steps", "1"], fitted)] {
+            let err = said(command);
+            let expected = if says.is_empty() {
+                !err.contains("values")
+            } else {
+                err.contains(&format!("{name}: {says}"))
+            };
+            assert!(expected, "{command:?}: {err}");
+        }
+    }
+}

@@ -213,13 +213,8 @@ fn read_item(
         observer.note(&format!("{}: {note}", path.display()));
     }
     let bad = whole(&mut panorama).and_then(|()| panorama.sanitise()).map_err(|e| e.in_file(path))?;
-    if bad.nan + bad.infinite > 0 {
-        observer.note(&format!(
-            "{}: {} values that are not a number and {} infinite ones were replaced",
-            path.display(),
-            bad.nan,
-            bad.infinite
-        ));
+    for note in bad.notes() {
+        observer.note(&format!("{}: {note}", path.display()));
     }
     Item::split(path, panorama, grid, lights).map_err(|e| e.in_file(path))
 }

@@ -12,12 +12,29 @@ pub struct Sanitised {
     pub infinite: usize,
     /// Values that were zero or negative (−∞ included), now the smallest positive one.
     pub not_positive: usize,
+    /// Those of them that were below zero: filters with negative lobes leave such.
+    pub negative: usize,
 }
 
 impl Sanitised {
     /// All replaced values.
     pub fn total(self) -> usize {
         self.nan + self.infinite + self.not_positive
+    }
+
+    /// What a person should know of it. Zeros are not worth a word.
+    pub fn notes(self) -> Vec<String> {
+        let Self { nan, infinite, negative, .. } = self;
+        let mut notes = Vec::new();
+        if nan + infinite > 0 {
+            notes.push(format!(
+                "{nan} values that are not a number and {infinite} infinite ones were replaced"
+            ));
+        }
+        if negative > 0 {
+            notes.push(format!("{negative} negative values were replaced by the smallest positive one"));
+        }
+        notes
     }
 }
 
@@ -44,6 +61,7 @@ pub fn sanitise_values(values: &mut [f32]) -> Result<Sanitised> {
         } else if *v == f32::INFINITY {
             (report.infinite, *v) = (report.infinite + 1, largest);
         } else if *v <= 0.0 {
+            report.negative += usize::from(*v < 0.0);
             (report.not_positive, *v) = (report.not_positive + 1, smallest);
         }
     }
@@ -87,8 +105,12 @@ mod tests {
         let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 0.0, -0.0];
         let mut values = [&bad[..], &[0.5, 2.0, 1e-3]].concat();
         let report = sanitise_values(&mut values).unwrap();
-        assert_eq!(report, Sanitised { nan: 1, infinite: 1, not_positive: 4 });
+        assert_eq!(report, Sanitised { nan: 1, infinite: 1, not_positive: 4, negative: 2 });
         assert_eq!(report.total(), 6);
+        let [replaced, negative] = &report.notes()[..] else { panic!("two notes: {:?}", report.notes()) };
+        assert!(replaced.starts_with("1 values that are not a number and 1 infinite"), "{replaced}");
+        assert!(negative.starts_with("2 negative"), "{negative}");
+        assert!(Sanitised { not_positive: 7, ..Sanitised::default() }.notes().is_empty());
         assert_eq!(values, [1e-3, 2.0, 1e-3, 1e-3, 1e-3, 1e-3, 0.5, 2.0, 1e-3]);
     }
 

@@ -28,14 +28,7 @@ pub(crate) fn panorama(path: &Path, layer: &Layer, report: Report) -> Result<Pan
         ));
     }
     let bad = panorama.sanitise().map_err(|e| e.in_file(path))?;
-    if bad.nan + bad.infinite > 0 {
-        report.note(format_args!(
-            "{}: {} values that are not a number and {} infinite ones were replaced",
-            path.display(),
-            bad.nan,
-            bad.infinite
-        ));
-    }
+    notes(path, &bad.notes(), report);
     Ok(panorama)
 }
 

@@ -80,6 +80,10 @@ impl Input {
             report
                 .note(format_args!("{}: {bad} pixels are not numbers and count as unknown", path.display()));
         }
+        let negative = picture.pixels().as_flattened().iter().filter(|v| v.is_finite() && **v < 0.0).count();
+        if negative > 0 {
+            report.note(format_args!("{}: {negative} negative values count as black", path.display()));
+        }
         Ok(picture)
     }
 

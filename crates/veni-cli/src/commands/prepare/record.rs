@@ -112,7 +112,7 @@ impl Record {
 
 impl Facts {
     pub(super) fn new(id: String, examined: &Examined, network: Option<&NetworkSettings>) -> Self {
-        let Sanitised { nan, infinite, not_positive } = examined.replaced;
+        let Sanitised { nan, infinite, not_positive, .. } = examined.replaced;
         let by = |(estimate, network): (Estimate, &NetworkSettings)| ByNetwork {
             model: network.model.clone(),
             sha256: network.sha256,

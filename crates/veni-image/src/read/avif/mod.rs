@@ -3,6 +3,7 @@
 //! Boxes: ISO/IEC 14496-12 and 23008-12. Colour code points and Y′CbCr: ITU-T H.273; what an `nclx` box says goes before what
 //! the AV1 stream says, and an unspecified matrix is that of BT.601.
 
+mod boxes;
 mod frame;
 mod sequence;
 #[cfg(test)]
@@ -38,15 +39,20 @@ fn content(file: impl Read, path: &Path) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+fn parse(mut bytes: &[u8]) -> Result<AvifData> {
+    boxes::check(bytes)?;
+    AvifData::from_reader(&mut bytes).map_err(wrap)
+}
+
 /// The size that the picture's stream declares.
 pub(super) fn declared(file: impl Read, path: &Path) -> Result<[u64; 2]> {
-    let data = AvifData::from_reader(&mut content(file, path)?.as_slice()).map_err(wrap)?;
+    let data = parse(&content(file, path)?)?;
     Ok(Sequence::of(&data.primary_item)?.size)
 }
 
 pub(super) fn read(file: impl Read, path: &Path, options: &ReadOptions) -> Result<LdrPanorama> {
     let bytes = content(file, path)?;
-    let data = AvifData::from_reader(&mut bytes.as_slice()).map_err(wrap)?;
+    let data = parse(&bytes)?;
     let sequence = Sequence::of(&data.primary_item)?;
     let size = sequence.size.map(|n| n as usize);
     let grid = options.check(size[0], size[1])?;

@@ -1,6 +1,7 @@
 //! OpenEXR through the block interface of the `exr` crate: its header is judged before anything is allocated,
 //! and only the channels that are needed are kept.
 
+mod dwa;
 mod layers;
 mod pixels;
 mod tags;

@@ -13,6 +13,7 @@ use half::f16;
 use half::slice::HalfFloatSliceExt;
 use rayon::prelude::*;
 
+use super::dwa;
 use super::layers::Choice;
 use super::wrap;
 use crate::{Error, Result};
@@ -54,6 +55,7 @@ pub(super) fn read(
         let decoded = batch
             .into_par_iter()
             .map(|chunk| {
+                dwa::check(&chunk, header)?;
                 let block = UncompressedBlock::decompress_chunk(chunk, &meta, false)?;
                 Ok((block.index, rows(&block, choice, header)?))
             })
