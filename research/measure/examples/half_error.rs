@@ -5,6 +5,8 @@
 //! cargo run --release -p veni-research --example half_error -- PANORAMA…
 //! ```
 
+#![allow(clippy::print_stdout, reason = "results go to stdout")]
+
 use std::path::PathBuf;
 
 use veni_image::{Panorama, half_error};
