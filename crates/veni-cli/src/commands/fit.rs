@@ -132,7 +132,8 @@ impl Fit {
         let model = FitModel::new(source::model(&self.model)?)?;
         // of part of the sphere the brightest is not known
         let whole = self.input.view().is_none() && self.input.mask().is_none();
-        let lit = model.lights() > 0 && whole || self.lit.lobes(model.lobes()) > 0;
+        let lobes = self.rendered.normals.is_none() && self.lit.lobes(model.lobes()) > 0;
+        let lit = model.lights() > 0 && whole || lobes;
         let config = self.settings.config(self.rendered.normals.is_some(), lit)?;
         report::each(pictures.iter().enumerate().filter(|(at, _)| self.shard.pick(*at)), |(at, path)| {
             self.one(&piped::input(path)?, outputs.get(at), &model, &config, report)
