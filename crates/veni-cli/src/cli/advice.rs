@@ -9,7 +9,7 @@ use super::Cli;
 use crate::features::{GPU, LEARN};
 
 /// Options of cargo and other programs, which documents and messages name too.
-const FOREIGN: [&str; 32] = [
+const FOREIGN: [&str; 34] = [
     "array",
     "bench",
     "cases",
@@ -17,11 +17,13 @@ const FOREIGN: [&str; 32] = [
     "command",
     "compare",
     "cpus-per-task",
+    "deploy",
     "details",
     "edges",
     "example",
     "export",
     "features",
+    "ibl-samples",
     "include",
     "lib",
     "light",
