@@ -47,7 +47,6 @@ pub(crate) fn model(args: &ModelArgs) -> Result<Loaded> {
 const SMALLEST: &str = "27";
 
 /// A model inside the program, as `--model` names it.
-#[cfg(feature = "pretrained")]
 struct Embedded {
     name: &'static str,
     /// D = 3N of its vectors.
@@ -55,32 +54,25 @@ struct Embedded {
     lobes: usize,
 }
 
-/// The models inside the program. The size of a code is 3N + 7M + 7K with N vectors, M lights (here one) and K lobes; docs/DECISIONS.md says why
-/// larger codes have lobes and not more vectors.
-#[cfg(feature = "pretrained")]
+/// The models that may be inside the program. The size of a code is 3N + 7M + 7K with N vectors, M lights (here one) and K lobes;
+/// docs/DECISIONS.md says why larger codes have lobes and not more vectors.
 const EMBEDDED: [Embedded; 5] = [
-    Embedded { name: "27", dimension: 27, lobes: 0 },
+    Embedded { name: SMALLEST, dimension: 27, lobes: 0 },
     Embedded { name: "147", dimension: 27, lobes: 16 },
     Embedded { name: "300", dimension: 27, lobes: 38 },
-    Embedded { name: VECTORS_147, dimension: 147, lobes: 0 },
-    Embedded { name: VECTORS_300, dimension: 300, lobes: 0 },
+    Embedded { name: "vectors-147", dimension: 147, lobes: 0 },
+    Embedded { name: "vectors-300", dimension: 300, lobes: 0 },
 ];
-
-const VECTORS_147: &str = "vectors-147";
-const VECTORS_300: &str = "vectors-300";
 
 /// How `--model` names the model inside the program whose codes have `vectors` vectors.
 pub(super) fn name_of(vectors: usize) -> &'static str {
-    match vectors {
-        49 => VECTORS_147,
-        100 => VECTORS_300,
-        _ => SMALLEST,
-    }
+    let found = EMBEDDED.iter().find(|e| e.dimension == 3 * vectors && e.lobes == 0);
+    found.map_or(SMALLEST, |e| e.name)
 }
 
-/// The latent dimension of a model, or one of the two other names; not a file.
+/// One of those names, or the latent dimension of a model that is not inside; not a file.
 fn is_embedded_name(name: &str) -> bool {
-    [VECTORS_147, VECTORS_300].contains(&name) || name.parse::<usize>().is_ok()
+    EMBEDDED.iter().any(|e| e.name == name) || name.parse::<usize>().is_ok()
 }
 
 #[cfg(feature = "pretrained")]

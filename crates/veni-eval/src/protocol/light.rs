@@ -7,7 +7,7 @@
 //! resolution of the evaluation. The angle between the two, |ln| of the ratio of their irradiances, and how many panoramas have one in one of
 //! the two only.
 
-use super::quality::{codes, reconstruct};
+use super::quality::{Reconstructed, reconstruct};
 use super::{Evaluation, Report, reconstruction};
 use crate::Result;
 use crate::codec::Codec;
@@ -86,8 +86,7 @@ pub fn keep(run: &Evaluation<'_>, part: Part) -> Result<()> {
 
 fn add(run: &Evaluation<'_>, codec: &dyn Codec, all: &mut Table, each: &mut Table) -> Result<()> {
     let (grid, items) = (run.data.grid(), run.data.items());
-    let images = reconstruct(run, codec)?.images;
-    let codes = codes(run, codec)?;
+    let Reconstructed { codes, images, .. } = reconstruct(run, codec)?;
     let lit = parallel(items.len(), |at| {
         let named = codec.lights(&codes[at]).and_then(|lights| lights.sun().copied());
         let found = named.map_or_else(|| sun(grid, &images[at]), |sun| Ok(Some(sun)))?;

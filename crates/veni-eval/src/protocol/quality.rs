@@ -55,9 +55,10 @@ pub(super) struct Quality {
     pub(super) sun: Option<f64>,
 }
 
-/// Reconstructions (log radiance at exposure 0) and scores of all panoramas.
+/// Codes, reconstructions (log radiance at exposure 0) and scores of all panoramas.
 #[derive(Debug)]
 pub(super) struct Reconstructed {
+    pub(super) codes: Vec<Vec<f32>>,
     pub(super) images: Vec<Vec<f32>>,
     pub(super) each: Vec<Quality>,
     pub(super) mean: Quality,
@@ -74,7 +75,7 @@ pub(super) fn reconstruct(run: &Evaluation<'_>, codec: &dyn Codec) -> Result<Rec
     })?;
     let (images, each): (Vec<_>, Vec<_>) = results.into_iter().unzip();
     let mean = Quality::mean(&each);
-    Ok(Reconstructed { images, each, mean })
+    Ok(Reconstructed { codes, images, each, mean })
 }
 
 /// The codes alone.
