@@ -88,7 +88,9 @@ fn every_preset_and_objective_lowers_its_loss_and_seeds_name_starts() {
     }
     let lit = |share: &str| loss(&["--preset", "energy", "--share", share]);
     assert!(lit("0.05") == loss(&["--objective", "energy"]) && lit("0.05") != lit("0.2"));
-    assert_eq!(lit("0"), loss(&[]));
+    // without its share the energy's weights are 1, to the rounding of the products
+    let (none, plain) = (lit("0"), loss(&[]));
+    assert!((none / plain - 1.0).abs() < 1e-12, "{none} for {plain}");
     let by = |method: &str| loss(&["--method", method]);
     assert!(by("auto") == by("levenberg-marquardt") && by("auto") != by("adam"));
     let noise = |seed: &str| loss(&["--start", "noise", "--seed", seed]);

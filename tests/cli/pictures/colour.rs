@@ -39,6 +39,7 @@ fn radiance_headers_are_obeyed() {
         ("COLORCORR=2 2 2\n", "\n", 0.5),
         ("PRIMARIES=0 0 0 0 0 0 0 0\n", "\n", 1.0),
         ("", "\r\n", 1.0),
+        ("EXPOSURE=2\n", "\r", 0.5),
     ] {
         dir.write("a.hdr", hdr(lines, end));
         let found = mean(&dir, &["a.hdr"]);

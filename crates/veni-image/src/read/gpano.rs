@@ -24,7 +24,8 @@ impl Sphere {
     /// From a packet, for a file of `size` pixels; nothing where it says nothing.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] for other projections, [`Error::Invalid`] for a part that sticks out of its whole.
+    /// [`Error::Unsupported`] for other projections, [`Error::Invalid`] for a part that sticks out of its whole, or whose place is
+    /// not given in numbers.
     pub(super) fn of(packet: &str, size: [usize; 2]) -> Result<Self> {
         let Some(gpano) = Namespace::find(packet, GPANO) else { return Ok(Self::default()) };
         if let Some(projection) = gpano.text("ProjectionType")
@@ -40,13 +41,15 @@ impl Sphere {
             let [pitch, roll] = angles;
             notes.push(format!("its XMP says that the camera was tilted (GPano pitch {pitch}°, roll {roll}°); it is not levelled"));
         }
-        let pair = |names: [&str; 2]| -> Option<[f64; 2]> {
-            Some([gpano.number(names[0])?, gpano.number(names[1])?])
-        };
-        let full = pair(["FullPanoWidthPixels", "FullPanoHeightPixels"]);
-        let part = pair(["CroppedAreaImageWidthPixels", "CroppedAreaImageHeightPixels"]);
-        let corner = pair(["CroppedAreaLeftPixels", "CroppedAreaTopPixels"]).unwrap_or_default();
-        let Some((full, part)) = full.zip(part).filter(|(f, p)| f.iter().chain(p).all(|v| *v >= 1.0)) else {
+        let [width, height] = [gpano.pixels("FullPanoWidthPixels")?, gpano.pixels("FullPanoHeightPixels")?];
+        let full = width.zip(height);
+        let [width, height] =
+            [gpano.pixels("CroppedAreaImageWidthPixels")?, gpano.pixels("CroppedAreaImageHeightPixels")?];
+        let part = width.zip(height);
+        let [left, top] = [gpano.pixels("CroppedAreaLeftPixels")?, gpano.pixels("CroppedAreaTopPixels")?];
+        let corner = [left.unwrap_or(0.0), top.unwrap_or(0.0)];
+        let sizes = full.zip(part).map(|(full, part)| [<[f64; 2]>::from(full), part.into()]);
+        let Some([full, part]) = sizes.filter(|s| s.as_flattened().iter().all(|v| *v >= 1.0)) else {
             return Ok(Self { crop: None, notes });
         };
         if part == full {
@@ -71,6 +74,17 @@ impl Sphere {
             corner: crop.map(|[_, corner]| corner as usize),
         };
         Ok(Self { crop: Some(crop), notes })
+    }
+}
+
+impl Namespace<'_> {
+    /// A count of pixels, if it is there.
+    fn pixels(&self, name: &str) -> Result<Option<f64>> {
+        let Some(text) = self.text(name).filter(|text| !text.is_empty()) else { return Ok(None) };
+        let number = self.number(name).ok_or_else(|| {
+            Error::invalid(format!("its XMP says GPano:{name} = {text:?}, which is not a number"))
+        })?;
+        Ok(Some(number))
     }
 }
 

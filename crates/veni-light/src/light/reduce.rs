@@ -1,5 +1,7 @@
 //! Fewer pixels, the same light: mean radiance over the solid angle of 2 × 2 pixels.
 
+use std::sync::Arc;
+
 use super::EnvironmentMap;
 use crate::sphere::Equirect;
 
@@ -7,7 +9,8 @@ use crate::sphere::Equirect;
 #[derive(Clone, Debug)]
 pub(super) struct Reduced<'a> {
     map: EnvironmentMap<'a>,
-    halved: Option<(Equirect, Vec<[f32; 3]>)>,
+    /// Shared by clones.
+    halved: Option<Arc<(Equirect, Vec<[f32; 3]>)>>,
 }
 
 impl<'a> Reduced<'a> {
@@ -23,14 +26,14 @@ impl<'a> Reduced<'a> {
             let (grid, pixels) =
                 halved.as_ref().map_or((map.grid(), map.pixels()), |(grid, pixels)| (*grid, pixels));
             if grid.width / 2 < width || grid.width % 2 == 1 || grid.height % 2 == 1 {
-                return Self { map, halved };
+                return Self { map, halved: halved.map(Arc::new) };
             }
             halved = Some(half(grid, pixels, ceiling));
         }
     }
 
     pub(super) fn map(&self) -> EnvironmentMap<'_> {
-        match &self.halved {
+        match self.halved.as_deref() {
             Some((grid, pixels)) => EnvironmentMap::trusted(*grid, pixels),
             None => self.map,
         }

@@ -263,6 +263,18 @@ fn crop() {
     assert!(ldr.grid().width == 16 && ldr.known().is_none() && ldr.notes()[0].contains("GPano"));
     let error = File::new(&jpeg(&grey(16, 8), &[gpano([64, 32], [32, 16], [40, 8], "")])).error();
     assert!(error.contains("GPano") && error.contains("do not fit"), "{error}");
+    let sizes = "GPano:FullPanoWidthPixels='32' GPano:FullPanoHeightPixels='16' \
+        GPano:CroppedAreaImageWidthPixels='16' GPano:CroppedAreaImageHeightPixels='8' ";
+    let placed = |top: &str| {
+        let all = format!("{sizes}GPano:CroppedAreaTopPixels='{top}'");
+        File::new(&jpeg(&grey(16, 8), &[xmp(GPANO, "GPano", &all)]))
+    };
+    let error = placed("4,5").error();
+    assert!(error.contains("CroppedAreaTopPixels") && error.contains("4,5"), "{error}");
+    // what is not said is 0, whatever else is said
+    let Content::Display(ldr) = placed("4").content().unwrap() else { panic!("display values") };
+    let known = ldr.known().unwrap();
+    assert_eq!([known[3 * 32], known[4 * 32], known[4 * 32 + 15], known[4 * 32 + 16]], [0.0, 1.0, 1.0, 0.0]);
 }
 
 fn projection() {

@@ -23,12 +23,13 @@ pub(super) struct Header {
 impl Header {
     /// Reads up to the first pixel.
     pub(super) fn read(file: &mut impl BufRead, path: &Path) -> Result<Self> {
+        let end = line_end(file.fill_buf().map_err(|e| wrap(e, path))?);
         let mut rest = file.take(LARGEST);
         let mut lines = Vec::new();
         let mut is_xyz = false;
         let mut first = true;
         loop {
-            let line = line(&mut rest, path)?.ok_or_else(|| match rest.limit() {
+            let line = line(&mut rest, end, path)?.ok_or_else(|| match rest.limit() {
                 0 => Error::too_large(format!("a Radiance header of more than {LARGEST} bytes")),
                 _ => Error::invalid("truncated Radiance .hdr file: its header does not end"),
             })?;
@@ -54,7 +55,7 @@ impl Header {
             }
             first = false;
         }
-        let resolution = line(&mut rest, path)?;
+        let resolution = line(&mut rest, end, path)?;
         let resolution =
             resolution.ok_or_else(|| Error::invalid("truncated Radiance .hdr file: no resolution"))?;
         let layout = Layout::parse(&resolution).ok_or_else(|| {
@@ -80,11 +81,20 @@ impl Header {
     }
 }
 
-/// One line without its end, which is LF or CR LF; nothing at the end of the file.
-fn line(file: &mut impl BufRead, path: &Path) -> Result<Option<String>> {
+/// The last byte of every line: LF, or CR where the first line ends in one alone.
+pub(in crate::read) fn line_end(start: &[u8]) -> u8 {
+    let first = start.iter().position(|b| matches!(b, b'\r' | b'\n'));
+    match first.map(|at| &start[at..]) {
+        Some([b'\r', next, ..]) if *next != b'\n' => b'\r',
+        _ => b'\n',
+    }
+}
+
+/// One line without its end, which is `end`, or CR LF where that is LF; nothing at the end of the file.
+fn line(file: &mut impl BufRead, end: u8, path: &Path) -> Result<Option<String>> {
     let mut bytes = Vec::new();
-    file.read_until(b'\n', &mut bytes).map_err(|e| wrap(e, path))?;
-    if bytes.pop() != Some(b'\n') {
+    file.read_until(end, &mut bytes).map_err(|e| wrap(e, path))?;
+    if bytes.pop() != Some(end) {
         return Ok(None);
     }
     if bytes.last() == Some(&b'\r') {

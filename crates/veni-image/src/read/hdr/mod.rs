@@ -15,6 +15,7 @@ use crate::colour::XYZ;
 use crate::panorama::Panorama;
 use crate::{Error, Result};
 use header::Header;
+pub(super) use header::line_end;
 
 pub(super) fn read(mut file: impl BufRead, path: &Path, options: &ReadOptions) -> Result<Panorama> {
     let header = Header::read(&mut file, path)?;

@@ -26,7 +26,12 @@ fn lines_may_end_in_carriage_return_and_line_feed() {
     let split = plain.len() - 8;
     let text = String::from_utf8(plain[..split].to_vec()).unwrap();
     let expected = [[1.0, 0.5, 0.25], [10.0, 13.0, 10.0].map(|v| v / 128.0)];
-    for text in [text.clone(), text.replace('\n', "\r\n"), text.replace("BE\n\n", "BE\r\n\r\n")] {
+    for text in [
+        text.clone(),
+        text.replace('\n', "\r\n"),
+        text.replace("BE\n\n", "BE\r\n\r\n"),
+        text.replace('\n', "\r"),
+    ] {
         let read = read_bytes(&[text.as_bytes(), &plain[split..]].concat()).unwrap();
         assert_eq!(read.pixels(), expected, "{text:?}");
         assert_eq!(read.attributes()["FORMAT"], "32-bit_rle_rgbe");

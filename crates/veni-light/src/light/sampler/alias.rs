@@ -1,5 +1,7 @@
 //! Walker's alias table: one of n things by its weight, in constant time.
 
+use std::sync::Arc;
+
 /// One cell: with probability `keep` it is its own thing, else `other`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cell {
@@ -7,10 +9,10 @@ pub(super) struct Cell {
     pub(super) other: u32,
 }
 
-/// A table with a power of two of cells, so that a random f32 falls into each equally often.
+/// A table with a power of two of cells, so that a random f32 falls into each equally often. Clones share it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Alias {
-    cells: Vec<Cell>,
+    cells: Arc<Vec<Cell>>,
 }
 
 impl Alias {
@@ -48,7 +50,7 @@ impl Alias {
                 left += weight(k) - mean;
             }
         }
-        Self { cells }
+        Self { cells: Arc::new(cells) }
     }
 
     /// The thing that `u` and `v`, uniform in [0, 1), choose, and what `v` still holds, uniform again.

@@ -9,6 +9,7 @@ mod tests;
 pub use split::SplitSampler;
 
 use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
 
 use super::EnvironmentMap;
 use super::angle::pixel;
@@ -39,15 +40,29 @@ pub struct Sampler<'a> {
     map: Reduced<'a>,
     alias: Alias,
     /// cos θ of the edges of all rows.
-    heights: Vec<f32>,
+    heights: Arc<Vec<f32>>,
+    /// Of every pixel: a third of the memory that the pixels are spread over, which is what a lookup costs.
+    densities: Arc<Vec<f32>>,
     /// sin² of half the polar angle of the first row's lower edge.
     cap: f32,
-    /// The density of a pixel is scale · (luminance − floor)₊ + even.
+    density: Density,
+    /// Sine and cosine of the rotation.
+    rotation: [f32; 2],
+}
+
+/// The density of a pixel, scale · (luminance − floor)₊ + even.
+#[derive(Clone, Copy, Debug)]
+struct Density {
     scale: f32,
     floor: f32,
     even: f32,
-    /// Sine and cosine of the rotation.
-    rotation: [f32; 2],
+}
+
+impl Density {
+    #[inline]
+    fn of(self, radiance: [f32; 3]) -> f32 {
+        self.scale * (luminance(radiance) - self.floor).max(0.0) + self.even
+    }
 }
 
 /// A direction and what is known of it.
@@ -96,11 +111,15 @@ impl<'a> Sampler<'a> {
         let heights =
             (0..=grid.height).map(|j| (std::f64::consts::PI * j as f64 / grid.height as f64).cos() as f32);
         let cap = (0.5 * std::f64::consts::PI / grid.height as f64).sin().powi(2) as f32;
-        let heights = heights.collect();
-        Self { alias: Alias::new(&weights), heights, cap, scale, floor, even, rotation, map }
+        let alias = Alias::new(&weights);
+        drop(weights);
+        let density = Density { scale, floor, even };
+        let densities = Arc::new(view.pixels().iter().map(|pixel| density.of(*pixel)).collect());
+        Self { alias, heights: Arc::new(heights.collect()), densities, density, cap, rotation, map }
     }
 
-    /// The same of the map rotated by `angle` radians about z, counter-clockwise seen from above. Nothing is computed again.
+    /// The same of the map rotated by `angle` radians about z, counter-clockwise seen from above. Nothing is computed
+    /// again, and all is shared.
     #[must_use]
     pub fn rotated(&self, angle: f32) -> Self {
         let ([s, c], (sin, cos)) = (self.rotation, angle.sin_cos());
@@ -144,24 +163,28 @@ impl<'a> Sampler<'a> {
     /// The density with which a unit direction is drawn, 1/sr.
     #[inline]
     pub fn pdf(&self, direction: [f32; 3]) -> f32 {
-        self.density(self.radiance(direction))
+        self.densities[self.nearest(direction)]
     }
 
     /// The radiance from a unit direction, that of its pixel.
     #[inline]
-    pub fn radiance(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
-        let view = self.map.map();
-        let Equirect { width, height } = view.grid();
+    pub fn radiance(&self, direction: [f32; 3]) -> [f32; 3] {
+        self.map.map().pixels()[self.nearest(direction)]
+    }
+
+    /// The pixel that a unit direction lies in.
+    #[inline]
+    fn nearest(&self, [x, y, z]: [f32; 3]) -> usize {
+        let grid = self.map.map().grid();
         let [s, c] = self.rotation;
-        let [column, row] = pixel(view.grid(), [x * c + y * s, y * c - x * s, z]);
-        let (row, column) = ((row as usize).min(height - 1), (column as usize).min(width - 1));
-        view.pixels()[row * width + column]
+        let [column, row] = pixel(grid, [x * c + y * s, y * c - x * s, z]);
+        (row as usize).min(grid.height - 1) * grid.width + (column as usize).min(grid.width - 1)
     }
 
     /// The density with which a pixel of this radiance is drawn, 1/sr: scale · (luminance − floor)₊ + even.
     #[inline]
     pub fn density(&self, radiance: [f32; 3]) -> f32 {
-        self.scale * (luminance(radiance) - self.floor).max(0.0) + self.even
+        self.density.of(radiance)
     }
 
     /// The map whose pixels are drawn, before any rotation: means where it had more than 2²³.
