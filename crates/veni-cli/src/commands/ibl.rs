@@ -226,11 +226,10 @@ impl Ibl {
         let rotated = |p: Panorama| if angle == 0.0 { p } else { p.rotated(angle) };
         let light = LightOptions { lights: 1, ..LightOptions::default() }.of(panorama.environment()?)?;
         let up = light.irradiance([0.0, 0.0, 1.0]);
-        match light.sun().filter(|_| self.sun == SunMode::Split) {
+        match light.sun().filter(|_| self.sun == SunMode::Split).map(|sun| sun.rotated(angle)) {
             Some(sun) => {
-                let rest = Panorama::new(panorama.grid(), light.residual().pixels().to_vec());
-                let sun = Some(sun.rotated(angle));
-                Ok(Split { map: rotated(rest), whole: Some(rotated(panorama)), sun, up })
+                let rest = Panorama::new(panorama.grid(), light.into_residual());
+                Ok(Split { map: rotated(rest), whole: Some(rotated(panorama)), sun: Some(sun), up })
             }
             None => Ok(Split { map: rotated(panorama), whole: None, sun: None, up }),
         }

@@ -32,8 +32,7 @@ use veni_light::output::Overwrite;
 
 type Result<T, E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
-const USAGE: &str =
-    "7_lit_scene [FOLDER] [-o FILE.png] [--size WxH] [--json] [--sun X,Y,Z] [--raw FILE] [--mirror X,Y,Z]…";
+const USAGE: &str = "7_lit_scene [FOLDER] [-o FILE.png] [--balls] [--exposure K] [--size WxH] [--json] [--sun X,Y,Z] [--raw FILE] [--mirror X,Y,Z]…";
 /// The most that the plane may be off.
 const BAR: f32 = 0.01;
 
@@ -51,14 +50,15 @@ fn main() -> Result<()> {
     if let Some(file) = &options.out {
         let [width, height] = options.size;
         // four samples per pixel
-        let large =
-            renderer.render(&Look::Picture, &Camera::picture(width, height), 2 * width, 2 * height, &sky)?;
+        let look = if options.balls { Look::Balls } else { Look::Picture };
+        let large = renderer.render(&look, &Camera::picture(width, height), 2 * width, 2 * height, &sky)?;
         let pixels = halved(&large, width as usize);
         if let Some(raw) = &options.raw {
             std::fs::write(raw, bytemuck::cast_slice(&pixels))?;
         }
-        write_png(file, options.size, &pixels)?;
-        eprintln!("{}", file.display());
+        let exposure = options.exposure.unwrap_or_else(|| by_the_median(&pixels));
+        write_png(file, options.size, &pixels, exposure)?;
+        eprintln!("{}, exposure {exposure}", file.display());
     }
     let towards = options.sun.or(sky.sun.as_ref().map(|sun| sun.direction)).unwrap_or([1.0, 0.0, 0.0]);
     let measured = Measured::of(&renderer, &sky, towards, &options.mirrors)?;
@@ -174,11 +174,15 @@ fn halved(pixels: &[[f32; 3]], width: usize) -> Vec<[f32; 3]> {
         .collect()
 }
 
-/// Exposed by the median, what is brighter than most rolled off.
-fn write_png(file: &Path, [width, height]: [u32; 2], radiance: &[[f32; 3]]) -> Result<()> {
+/// The exposure at which the median is a middle grey.
+fn by_the_median(radiance: &[[f32; 3]]) -> f32 {
     let mut sorted: Vec<f32> = radiance.iter().map(|&p| luminance(p)).collect();
     sorted.sort_by(f32::total_cmp);
-    let exposure = 0.35 / sorted[sorted.len() / 2].max(1e-6);
+    0.35 / sorted[sorted.len() / 2].max(1e-6)
+}
+
+/// What is brighter than most is rolled off.
+fn write_png(file: &Path, [width, height]: [u32; 2], radiance: &[[f32; 3]], exposure: f32) -> Result<()> {
     let curve = |v: f32| if v < 0.6 { v } else { 1.0 - 0.4 * (-(v - 0.6) / 0.4).exp() };
     let byte = |v: f32| (255.0 * srgb(curve(exposure * v)) + 0.5) as u8;
     let pixels: Vec<[u8; 3]> = radiance.iter().map(|p| p.map(byte)).collect();
@@ -189,6 +193,10 @@ struct Options {
     folder: Option<PathBuf>,
     out: Option<PathBuf>,
     size: [u32; 2],
+    /// Three balls.
+    balls: bool,
+    /// By which the picture is multiplied; by default what makes its median a middle grey.
+    exposure: Option<f32>,
     /// Print numbers only, without judging them.
     json: bool,
     /// Where the sun should be, in the renderer's axes; by default where the sky has it.
@@ -205,6 +213,8 @@ impl Options {
             folder: None,
             out: None,
             size: [360, 270],
+            balls: false,
+            exposure: None,
             json: false,
             sun: None,
             raw: None,
@@ -218,6 +228,8 @@ impl Options {
                 "-o" => options.out = Some(value()?.into()),
                 "--raw" => options.raw = Some(value()?.into()),
                 "--json" => options.json = true,
+                "--balls" => options.balls = true,
+                "--exposure" => options.exposure = Some(value()?.parse()?),
                 "--size" => {
                     let value = value()?;
                     let (width, height) = value.split_once('x').ok_or_else(|| wrong(&value))?;

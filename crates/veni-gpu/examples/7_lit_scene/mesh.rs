@@ -1,5 +1,5 @@
-//! The scene as triangles: a plane, a pole, a white sphere and a rough metal one; or, to measure light, plane and walls in white, a
-//! black pole and a mirror.
+//! The scene as triangles: a plane, a pole, a white sphere and a rough metal one; with a diffuse, a matte silver and a mirror ball
+//! instead; or, to measure light, plane and walls in white, a black pole and a mirror.
 
 use std::f32::consts::{PI, TAU};
 
@@ -11,6 +11,8 @@ pub(crate) type Vertex = [[f32; 3]; 3];
 pub(crate) enum Look {
     /// To look at.
     Picture,
+    /// To compare lights by eye.
+    Balls,
     /// To measure.
     White,
 }
@@ -43,6 +45,13 @@ pub(crate) fn scene(look: Look) -> Vec<Vertex> {
             pole(&mut mesh, matt(0.8));
             sphere(&mut mesh, [0.2, 0.6, 1.5], 0.6, matt(0.8));
             sphere(&mut mesh, [0.6, 0.6, -1.4], 0.6, [0.9, 1.0, 0.3]);
+        }
+        Look::Balls => {
+            square(&mut mesh, [0.0; 3], up, 30.0, matt(0.5));
+            pole(&mut mesh, matt(0.8));
+            sphere(&mut mesh, [0.2, 0.6, 1.5], 0.6, matt(0.8));
+            sphere(&mut mesh, [2.6, 0.6, 0.6], 0.6, [0.9, 1.0, 0.5]);
+            sphere(&mut mesh, [0.6, 0.6, -1.4], 0.6, [0.9, 1.0, 0.0]);
         }
         Look::White => {
             square(&mut mesh, [0.0; 3], up, 30.0, matt(1.0));

@@ -24,7 +24,7 @@ pub(crate) struct Renderer {
     caster: (wgpu::RenderPipeline, wgpu::BindGroup),
     surface: (wgpu::RenderPipeline, wgpu::BindGroup),
     background: (wgpu::RenderPipeline, wgpu::BindGroup),
-    meshes: [(Look, wgpu::Buffer, u32); 2],
+    meshes: [(Look, wgpu::Buffer, u32); 3],
     last_level: f32,
 }
 
@@ -95,7 +95,7 @@ impl Renderer {
         let surface = bound(surface, &[0, 1, 2, 3, 5, 7, 8]);
         let background = bound(background, &[0, 4, 6]);
 
-        let meshes = [Look::Picture, Look::White].map(|look| {
+        let meshes = [Look::Picture, Look::Balls, Look::White].map(|look| {
             let triangles = scene(look);
             let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                 label: Some("triangles"),

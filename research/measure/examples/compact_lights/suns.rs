@@ -7,13 +7,15 @@ use veni_synth::{Overrides, Scene, SkyKind, render};
 
 /// A sun is seen where it outshines by this factor whatever is from 2° to 6° off.
 const VISIBLE: f32 = 5.0;
-/// A sun farther from the truth than this many pixels, and 1.5°, is another light.
+/// A sun farther from the truth than this many pixels, 1.5° and its own radius is another light.
 const PIXELS: f64 = 3.0;
 /// A moon counts as seen by the same.
 struct Row {
     seen: bool,
     moon: bool,
     error: Option<f64>,
+    /// Radius of what was found, degrees.
+    radius: f64,
     moon_error: Option<f64>,
 }
 
@@ -27,19 +29,18 @@ pub(crate) fn run(count: u64, width: usize) {
         let overrides = Overrides { sky: Some(kind), ..Overrides::default() };
         let rows: Vec<Row> =
             (0..count).into_par_iter().map(|k| look(&Scene::draw(1, k, &overrides), grid)).collect();
-        let near = |e: f64| e <= (PIXELS * pixel).max(1.5);
+        let near = |r: &Row, e: f64| e <= (PIXELS * pixel).max(1.5).max(r.radius);
         let mut errors: Vec<f64> = rows
             .iter()
             .filter(|r| r.seen)
-            .filter_map(|r| r.error)
-            .filter(|e| near(*e))
+            .filter_map(|r| r.error.filter(|e| near(r, *e)))
             .map(|e| e / pixel)
             .collect();
         errors.sort_by(f64::total_cmp);
-        let moons = rows.iter().filter(|r| r.moon_error.is_some_and(near)).count();
+        let moons = rows.iter().filter(|r| r.moon_error.is_some_and(|e| near(r, e))).count();
         let false_suns = rows
             .iter()
-            .filter(|r| r.error.is_some_and(|e| !near(e)) && !r.moon_error.is_some_and(near))
+            .filter(|r| r.error.is_some_and(|e| !near(r, e)) && !r.moon_error.is_some_and(|e| near(r, e)))
             .count();
         let at = |part: f64| match errors.len() {
             0 => "–".to_owned(),
@@ -71,6 +72,7 @@ fn look(scene: &Scene, grid: Equirect) -> Row {
         seen: scene.sun_elevation > -0.5 && seen(scene.sun()),
         moon: moon.is_some_and(seen),
         error: error(scene.sun()),
+        radius: light.sun().map_or(0.0, |sun| f64::from(sun.radius.to_degrees())),
         moon_error: moon.and_then(error),
     }
 }

@@ -125,6 +125,11 @@ impl Level {
         View { level: self, cells: if self.means.is_empty() { pixels } else { &self.means } }
     }
 
+    /// Of the map.
+    pub(in crate::light) fn grid(&self) -> Equirect {
+        self.grid
+    }
+
     /// Number of columns.
     pub(in crate::light) fn width(&self) -> usize {
         self.width

@@ -2,6 +2,7 @@
 
 mod level;
 mod measure;
+mod opposite;
 mod search;
 mod shape;
 mod sun;
@@ -14,8 +15,9 @@ use crate::luminance::luminance;
 use crate::sphere::Equirect;
 use crate::tasks;
 pub(super) use level::Level;
-use level::View;
+use level::{Cell, View};
 use measure::{Measured, core_centre, luminance_of, measure};
+use opposite::Opposite;
 
 /// Radii of the caps that a light is measured in, degrees.
 const SCALES: [f64; 6] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
@@ -88,6 +90,8 @@ struct Found {
     kind: Kind,
     /// Its share of the light that reached a surface facing it, 0 to 1 (luminance).
     share: f32,
+    /// Its energy and its share with all that stands out about it, its own or not (luminance).
+    whole: [f64; 2],
     /// The middle of its brightest part.
     core: [f32; 3],
     /// Its peak luminance over that of its background.
@@ -96,6 +100,8 @@ struct Found {
     peak: f64,
     /// The how manyth it was to be found.
     order: usize,
+    /// Where it was found.
+    measured: Measured,
 }
 
 /// What an extraction gives.
@@ -127,7 +133,7 @@ impl Extraction {
             && criteria.keep > 0
             && let Some(measured) = self.near(direction)
         {
-            found.push(self.take(&measured));
+            found.push(self.take(&measured, false));
             sun = Some(0);
         }
         let nothing = choice == SunChoice::Nothing || criteria.keep == 0;
@@ -136,7 +142,7 @@ impl Extraction {
             // a bright pixel among sixteen still stands out, and the seed is only near it
             let seeds = search::seeds(self.view(1.min(self.levels.len() - 1)), self.coarsest());
             match self.strongest(&seeds, criteria) {
-                Some(measured) => found.push(self.take(&measured)),
+                Some(measured) => found.push(self.take(&measured, false)),
                 None => break,
             }
         }
@@ -148,9 +154,11 @@ impl Extraction {
         if let Some(at) = sun {
             found[..=at].rotate_right(1);
             // shadows of the sun fall by its brightest part, whatever glows around it
-            let Found { light, core, kind, .. } = &mut found[0];
-            if *kind == Kind::Glow {
-                light.direction = *core;
+            if found[0].kind == Kind::Glow {
+                self.put_back(found[0].order);
+                let Found { light, core, share, order, .. } = self.take(&found[0].measured, true);
+                found[0] =
+                    Found { light: CompactLight { direction: core, ..light }, share, order, ..found[0] };
             }
         }
         let narrow = |f: &Found| f.light.radius <= criteria.widest;
@@ -236,33 +244,36 @@ impl Extraction {
         found.filter(enough)
     }
 
-    /// Replaces what exceeds the background by the background.
-    fn take(&mut self, measured: &Measured) -> Found {
+    /// Replaces what exceeds the background by the background; of a disc's surroundings, and of a glow's that is `centred`, only as far
+    /// as they lie evenly about it.
+    fn take(&mut self, measured: &Measured, centred: bool) -> Found {
         let full = self.view(0);
         let facing = self.facing(measured.centre);
         let (peak, clipped) = shape::top(full, measured);
-        let mut energy = [0.0; 3];
-        let mut moment = [0.0; 3];
-        let mut changed = Vec::new();
-        full.cap(measured.centre, measured.scale, |cell| {
-            let rest = [0, 1, 2].map(|c| cell.radiance[c].min(measured.background[c]));
-            for c in 0..3 {
-                energy[c] += cell.solid_angle * (f64::from(cell.radiance[c]) - f64::from(rest[c]));
-            }
-            let taken = f64::from(luminance(cell.radiance)) - f64::from(luminance(rest));
-            moment = [0, 1, 2].map(|c| moment[c] + cell.solid_angle * taken * cell.direction[c]);
-            changed.push((cell.index, cell.radiance, rest));
-        });
         let pixel = self.levels[0].cell_angle();
-        let fine = if measured.scale <= FINE.to_radians() { full } else { self.for_scale(measured.scale) };
-        let (core, spread) = core_centre(fine, measured).unwrap_or((measured.centre, 0.0));
         // of what is wide, one pixel says little
         let wide = measured.scale > FINE.to_radians();
-        let over = if wide { measured.peak } else { peak - measured.background_luminance() };
-        let (mut radius, radius_source) = shape::radius(luminance_of(energy), over, spread, pixel);
+        let fine = if wide { self.for_scale(measured.scale) } else { full };
+        let (core, spread) = core_centre(fine, measured).unwrap_or((measured.centre, 0.0));
         let core = if angle(core, measured.centre) < measured.scale { core } else { measured.centre };
-        // the first moment of what is wide lights surfaces as it does
+        let plain = |cell: &Cell| [0, 1, 2].map(|c| cell.radiance[c].min(measured.background[c]));
+        let radius_of = |energy: [f64; 3]| {
+            let over = if wide { measured.peak } else { peak - measured.background_luminance() };
+            shape::radius(luminance_of(energy), over, spread, pixel)
+        };
+        let share = |energy: [f64; 3]| (luminance_of(energy) / facing).min(1.0) as f32;
+        let (mut energy, mut moment) = sums(full, measured, plain);
+        let (mut radius, mut radius_source) = radius_of(energy);
         let kind = Kind::of(radius as f32);
+        let opposite = Opposite::new(self.levels[0].grid(), &self.pixels, measured, core, PIXELS * pixel);
+        let even = |cell: &Cell| opposite.rest(cell, plain(cell));
+        let is_even = kind == Kind::Disc || (centred && kind == Kind::Glow);
+        let whole = [luminance_of(energy), f64::from(share(energy))];
+        if is_even {
+            (energy, moment) = sums(full, measured, even);
+            (radius, radius_source) = radius_of(energy);
+        }
+        // the first moment of what is wide lights surfaces as it does
         let mut direction = core;
         if let Some(middle) = normalised(moment)
             && kind != Kind::Disc
@@ -274,13 +285,20 @@ impl Extraction {
                 radius = (2.0 * mean - 1.0).clamp(-1.0, 1.0).acos();
             }
         }
-        for (index, _, rest) in &changed {
+        let mut pixels = Vec::new();
+        full.cap(measured.centre, measured.scale, |cell| {
+            let rest = if is_even { even(&cell) } else { plain(&cell) };
+            if rest != cell.radiance {
+                pixels.push((cell.index, cell.radiance, rest));
+            }
+        });
+        for (index, _, rest) in &pixels {
             self.pixels[*index] = *rest;
         }
         let rows = self.levels[0].pixel_rows(measured.centre, measured.scale);
         self.refresh(&rows);
         let order = self.changes.len();
-        self.changes.push(Change { rows, pixels: changed });
+        self.changes.push(Change { rows, pixels });
         let light = CompactLight {
             direction: direction.map(|c| c as f32),
             irradiance: energy.map(|e| e as f32),
@@ -288,8 +306,18 @@ impl Extraction {
             radius_source,
             clipped,
         };
-        let share = (luminance_of(energy) / facing).min(1.0) as f32;
-        Found { light, kind, share, core: core.map(|c| c as f32), contrast: measured.contrast(), peak, order }
+        let (share, core) = (share(energy), core.map(|c| c as f32));
+        Found {
+            light,
+            kind,
+            share,
+            whole,
+            core,
+            contrast: measured.contrast(),
+            peak,
+            order,
+            measured: *measured,
+        }
     }
 
     /// Undoes a taking, whatever was taken since.
@@ -335,4 +363,18 @@ impl Extraction {
         let fine = |level: &Level| level.cell_angle() <= scale / CELLS;
         self.view(self.levels.iter().rposition(fine).unwrap_or(0))
     }
+}
+
+/// Energy and first moment (luminance) of what a cap loses of whose cells this stays.
+fn sums(view: View<'_>, measured: &Measured, rest: impl Fn(&Cell) -> [f32; 3]) -> ([f64; 3], [f64; 3]) {
+    let (mut energy, mut moment) = ([0.0; 3], [0.0; 3]);
+    view.cap(measured.centre, measured.scale, |cell| {
+        let rest = rest(&cell);
+        for c in 0..3 {
+            energy[c] += cell.solid_angle * (f64::from(cell.radiance[c]) - f64::from(rest[c]));
+        }
+        let taken = f64::from(luminance(cell.radiance)) - f64::from(luminance(rest));
+        moment = [0, 1, 2].map(|c| moment[c] + cell.solid_angle * taken * cell.direction[c]);
+    });
+    (energy, moment)
 }

@@ -16,7 +16,7 @@ const DISC: f64 = 20.0;
 /// The same for what is spread wider.
 const SPREAD: f64 = 12.0;
 /// The least share of a wide sun, of a disc high up, and of one near the horizon, which the air dims.
-const SHARE: [f32; 3] = [0.1, 0.15, 0.02];
+const SHARE: [f64; 3] = [0.1, 0.15, 0.02];
 /// What is near the horizon: sine of 10°.
 const LOW: f32 = 0.173_648;
 /// Sky about the zenith over the irradiance of the sun, per steradian: that of the air alone is about 0.02, of this and less it
@@ -62,7 +62,7 @@ impl Surroundings {
 
     fn is_sun(&self, found: &Found, all: &[Found]) -> bool {
         let light = &found.light;
-        let energy = f64::from(luminance(light.irradiance));
+        let energy = found.whole[0];
         let least = match found.kind {
             Kind::Disc if light.direction[2] > LOW => SHARE[1],
             Kind::Disc => SHARE[2],
@@ -72,11 +72,9 @@ impl Surroundings {
         let sky = self.zenith / energy;
         let night = sky < DARK_SKY && self.zenith < DARK * self.ground;
         let alike = |other: &&Found| {
-            other.light.radius < 3f32.to_radians()
-                && other.contrast > 100.0
-                && 4.0 * f64::from(luminance(other.light.irradiance)) > energy
+            other.light.radius < 3f32.to_radians() && other.contrast > 100.0 && 4.0 * other.whole[0] > energy
         };
-        found.share >= least
+        found.whole[1] >= least
             && found.peak.min(energy / PATCH) >= prominent * self.bright
             && !night
             && all.iter().filter(alike).count() < LAMPS
