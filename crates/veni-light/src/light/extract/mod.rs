@@ -156,7 +156,10 @@ impl Extraction {
             // shadows of the sun fall by its brightest part, whatever glows around it
             if found[0].kind == Kind::Glow {
                 self.put_back(found[0].order);
-                let Found { light, core, share, order, .. } = self.take(&found[0].measured, true);
+                let Found { light, core, order, .. } = self.take(&found[0].measured, true);
+                // the share is of the light that there was when it was found
+                let share =
+                    found[0].share * luminance(light.irradiance) / luminance(found[0].light.irradiance);
                 found[0] =
                     Found { light: CompactLight { direction: core, ..light }, share, order, ..found[0] };
             }
