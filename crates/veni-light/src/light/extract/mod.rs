@@ -158,8 +158,8 @@ impl Extraction {
                 self.put_back(found[0].order);
                 let Found { light, core, order, .. } = self.take(&found[0].measured, true);
                 // the share is of the light that there was when it was found
-                let share =
-                    found[0].share * luminance(light.irradiance) / luminance(found[0].light.irradiance);
+                let [energy, share] = found[0].whole;
+                let share = (share * f64::from(luminance(light.irradiance)) / energy) as f32;
                 found[0] =
                     Found { light: CompactLight { direction: core, ..light }, share, order, ..found[0] };
             }
