@@ -9,8 +9,9 @@ use super::Cli;
 use crate::features::{GPU, LEARN};
 
 /// Options of cargo and other programs, which documents and messages name too.
-const FOREIGN: [&str; 34] = [
+const FOREIGN: [&str; 36] = [
     "array",
+    "balls",
     "bench",
     "cases",
     "check",
@@ -35,6 +36,7 @@ const FOREIGN: [&str; 34] = [
     "path",
     "picture",
     "release",
+    "same",
     "sampler",
     "samples",
     "scope",
