@@ -9,7 +9,7 @@ use super::Cli;
 use crate::features::{GPU, LEARN};
 
 /// Options of cargo and other programs, which documents and messages name too.
-const FOREIGN: [&str; 36] = [
+const FOREIGN: [&str; 37] = [
     "array",
     "balls",
     "bench",
@@ -41,6 +41,7 @@ const FOREIGN: [&str; 36] = [
     "samples",
     "scope",
     "signal",
+    "stable",
     "test",
     "threads",
     "time",
