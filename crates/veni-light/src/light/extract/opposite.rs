@@ -86,14 +86,15 @@ mod tests {
             .map(|d| {
                 let off = angle(d.map(f64::from), direction.map(f64::from)).to_degrees();
                 let left = d[1] * direction[0] > d[0] * direction[1];
-                [0.1 + if left { 240.0 * (-off / 3.0).exp() as f32 } else { 0.0 }; 3]
+                [0.1 + if left { 60.0 * (-off / 6.0).exp() as f32 } else { 0.0 }; 3]
             })
             .collect();
         Lights::new(Some(sun), []).add_to_rows(grid, 0..grid.height, &mut pixels);
         let light = Light::of(EnvironmentMap::new(grid, &pixels).unwrap());
         let found = light.sun().unwrap();
         let off = angle(found.direction.map(f64::from), direction.map(f64::from)).to_degrees();
-        assert!(off < 0.1, "{off}°");
+        // a quarter of a pixel
+        assert!(off < 0.18, "{off}°");
         // what was taken for the sun has its middle there
         let mut moment = [0.0; 3];
         for (k, d) in grid.directions().into_iter().enumerate() {
@@ -105,7 +106,7 @@ mod tests {
             }
         }
         let off = angle(normalised(moment).unwrap(), direction.map(f64::from)).to_degrees();
-        assert!(off < 0.15, "{off}°");
+        assert!(off < 0.18, "{off}°");
         // and surfaces are lit as by the map
         let facing = irradiance(grid, &pixels, direction);
         for normal in [direction, [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, -0.6, 0.8], [0.6, -0.8, 0.0]] {
