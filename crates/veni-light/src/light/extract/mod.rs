@@ -94,8 +94,6 @@ struct Found {
     whole: [f64; 2],
     /// The middle of its brightest part.
     core: [f32; 3],
-    /// Its peak luminance over that of its background.
-    contrast: f64,
     /// Its peak luminance.
     peak: f64,
     /// The how manyth it was to be found.
@@ -310,17 +308,7 @@ impl Extraction {
             clipped,
         };
         let (share, core) = (share(energy), core.map(|c| c as f32));
-        Found {
-            light,
-            kind,
-            share,
-            whole,
-            core,
-            contrast: measured.contrast(),
-            peak,
-            order,
-            measured: *measured,
-        }
+        Found { light, kind, share, whole, core, peak, order, measured: *measured }
     }
 
     /// Undoes a taking, whatever was taken since.

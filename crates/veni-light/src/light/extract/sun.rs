@@ -72,7 +72,9 @@ impl Surroundings {
         let sky = self.zenith / energy;
         let night = sky < DARK_SKY && self.zenith < DARK * self.ground;
         let alike = |other: &&Found| {
-            other.light.radius < 3f32.to_radians() && other.contrast > 100.0 && 4.0 * other.whole[0] > energy
+            other.light.radius < 3f32.to_radians()
+                && other.measured.contrast() > 100.0
+                && 4.0 * other.whole[0] > energy
         };
         found.whole[1] >= least
             && found.peak.min(energy / PATCH) >= prominent * self.bright
