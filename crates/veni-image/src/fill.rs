@@ -2,6 +2,9 @@
 
 use crate::panorama::Panorama;
 
+/// Less of a pixel, and it counts as unknown.
+const HALF: f32 = 0.5;
+
 /// A panorama of half the size: radiance × known summed over four pixels, and known.
 struct Level {
     width: usize,
@@ -37,8 +40,8 @@ impl Level {
 }
 
 impl Panorama {
-    /// Gives every unknown pixel the radiance of what is known around it. Returns the share that was
-    /// [unknown](Panorama::unknown); nothing is changed where nothing is known at all.
+    /// Gives every pixel of which less than half is known the radiance of what is known around it and of itself, as far as that goes.
+    /// Returns the share that was [unknown](Panorama::unknown); nothing is changed where nothing is known at all.
     pub fn fill(&mut self) -> f64 {
         let share = self.unknown();
         let Some(known) = self.known.take() else { return share };
@@ -64,7 +67,7 @@ impl Panorama {
             above = level;
         }
         for ((pixel, known), [r, g, b, _]) in self.pixels.iter_mut().zip(&known).zip(&above.sums) {
-            if *known <= 0.0 {
+            if *known < HALF {
                 *pixel = [*r, *g, *b];
             }
         }

@@ -53,14 +53,14 @@ pub use veni_light::{Error, Result};
 
 pub use budget::{Budget, Claim};
 pub use colour::{LUMINANCE, luminance};
-pub use panorama::{LOG_FLOOR, Panorama};
+pub use panorama::{DARK_SHARE, LOG_FLOOR, Panorama, without_zeros};
 pub use picture::{Picture, read_mask};
 pub use provenance::{PIXEL_DIGEST, Provenance};
 pub use read::{
     Content, DEFAULT_MAX_PIXELS, LdrPanorama, METADATA, Metadata, ReadOptions, Transfer, Treatment,
     attributes, peak_bytes,
 };
-pub use sanitise::{Sanitised, log_reference, sanitise_values};
+pub use sanitise::{Sanitised, log_reference};
 pub use sheet::{Sheet, write_png};
 pub use write::{
     HALF_ERROR, HALF_RANGE, HalfRange, Precision, RADIANCE_SCALE, RowSink, WriteFormat, WriteOptions,

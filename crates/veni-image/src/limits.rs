@@ -11,8 +11,8 @@ pub const DEFAULT_MAX_PIXELS: usize = 1 << 28;
 /// of [`DEFAULT_MAX_PIXELS`], more than any of these formats needs.
 pub const MAX_FILE_BYTES: u64 = 2 << 30;
 
-/// Bytes of metadata in one file besides pixels and colour profile: EXIF, XMP, text. XMP with an embedded gain map or
-/// thumbnail has a few MB; 64 MiB is far beyond that.
+/// Bytes of metadata in one file besides pixels and colour profile: EXIF, XMP, text; as they are stored, and once more as they are
+/// unpacked or put together. XMP with an embedded gain map or thumbnail has a few MB; 64 MiB is far beyond that.
 pub const MAX_METADATA_BYTES: u64 = 64 << 20;
 
 /// Bytes of a colour profile, after decompression. Table-based press profiles have 3 MB at most; a compressed chunk of

@@ -12,6 +12,13 @@ use crate::{exposure, luminance};
 /// ([`Panorama::log_floor`]).
 pub const LOG_FLOOR: f32 = 1e-8;
 
+/// Of the mean radiance: what a value of 0 stands for in a logarithm, where nothing that is darker is known. A ten-thousandth of the
+/// light more is no other light, and the deep shadows of photographs lie there.
+pub const DARK_SHARE: f64 = 1e-4;
+
+/// Of the luminance of its pixel: what a channel of 0 counts as in a logarithm, where others have light.
+const LEAST_CHANNEL: f32 = 0.01;
+
 /// Octaves of mean luminance to either side of 1 in which [`LOG_FLOOR`] is what it says.
 const ORDINARY: f64 = 12.0;
 
@@ -143,19 +150,45 @@ impl Panorama {
         LOG_FLOOR * self.unit()
     }
 
-    /// Natural-log radiance ln(L + [`Panorama::log_floor`]), row-major: what encoder and losses work on. The panorama
-    /// must be clean ([`Panorama::sanitise`]); a negative value gives NaN.
+    /// What a value of 0 stands for in a logarithm: the smallest positive value, or a ten-thousandth of the mean of all values if
+    /// that is less. (The smallest alone would be a lamp, where lamps are on black.) 0 for a black panorama.
+    pub fn darkest(&self) -> f32 {
+        let values = self.pixels.as_flattened();
+        let sum: f64 = values.iter().map(|v| f64::from(*v)).sum();
+        let positive = values.iter().copied().filter(|v| *v > 0.0);
+        positive.fold((DARK_SHARE * sum / values.len() as f64) as f32, f32::min)
+    }
+
+    /// Natural-log radiance ln(L + [`Panorama::log_floor`]), row-major: what encoder and losses work on. A channel of 0 counts as a
+    /// hundredth of its pixel's luminance, a black pixel as [`Panorama::darkest`]. The panorama must be clean
+    /// ([`Panorama::sanitise`]); a negative value gives NaN.
     pub fn log(&self) -> Vec<[f32; 3]> {
-        let floor = self.log_floor();
-        self.pixels.iter().map(|pixel| pixel.map(|v| (v + floor).ln())).collect()
+        let (floor, zero) = (self.log_floor(), self.zero());
+        self.pixels.iter().map(|&pixel| without_zeros(pixel, zero).map(|v| (v + floor).ln())).collect()
     }
 
     /// Solid-angle-weighted mean of ln(luminance + [`Panorama::log_floor`]) over the sphere: the `log_exposure` that is
-    /// subtracted from the log radiance before encoding and added back after decoding.
+    /// subtracted from the log radiance before encoding and added back after decoding; 0 counts as [`Panorama::darkest`].
     pub fn mean_log_luminance(&self) -> f32 {
-        let floor = self.log_floor();
-        let logs = self.pixels.iter().map(|&p| f64::from(luminance(p) + floor).ln());
+        let (floor, zero) = (self.log_floor(), self.zero());
+        let logs = self.pixels.iter().map(|&p| {
+            let l = luminance(p);
+            f64::from(if l == 0.0 { zero } else { l } + floor).ln()
+        });
         exposure::over_sphere(self.grid, &logs.collect::<Vec<_>>())
+    }
+
+    /// Replaces every 0 by what it counts as in [`Panorama::log`].
+    pub fn replace_zeros(&mut self) {
+        let zero = self.zero();
+        if zero > 0.0 {
+            self.pixels.iter_mut().for_each(|pixel| *pixel = without_zeros(*pixel, zero));
+        }
+    }
+
+    /// [`Panorama::darkest`], for which all pixels are looked at, where there is a 0.
+    fn zero(&self) -> f32 {
+        if self.pixels.as_flattened().contains(&0.0) { self.darkest() } else { 0.0 }
     }
 
     /// Multiplies every value by `factor`.
@@ -164,6 +197,16 @@ impl Panorama {
             *pixel = pixel.map(|v| v * factor);
         }
     }
+}
+
+/// A pixel as a logarithm takes it: a channel of 0 counts as a hundredth of its pixel's luminance, and at least as `zero`. Files of eight
+/// bits to a channel and a common exponent cannot tell less, and colours outside of Rec. 709 end at 0.
+pub fn without_zeros(pixel: [f32; 3], zero: f32) -> [f32; 3] {
+    if pixel.iter().all(|v| *v != 0.0) {
+        return pixel;
+    }
+    let least = zero.max(LEAST_CHANNEL * luminance(pixel));
+    pixel.map(|v| if v == 0.0 { least } else { v })
 }
 
 /// Share of the pixels of which less than half is known.

@@ -44,9 +44,10 @@ impl Picture {
                 mask.len()
             )));
         }
+        let mask = mask.iter().map(|m| if m.is_nan() { 0.0 } else { *m });
         self.known = Some(match self.known.take() {
             Some(known) => known.iter().zip(mask).map(|(k, m)| k * m).collect(),
-            None => mask.to_vec(),
+            None => mask.collect(),
         });
         Ok(self)
     }
@@ -124,22 +125,36 @@ impl Picture {
     }
 }
 
-/// A mask from a file: white is 1, black 0, and what is transparent is 0 too. PNG, JPEG, WebP as display values; EXR and
+/// A mask from a file: white is 1, black 0, and what is transparent or not a number is 0 too. PNG, JPEG, WebP as display values; EXR and
 /// Radiance as they stand. Returns `[W, H]` and one value per pixel, row-major, from 0 to 1.
 ///
 /// # Errors
-/// As [`Picture::read`].
+/// As [`Picture::read`]; [`Error::Invalid`] if the largest display value is the smallest above black, as of truth values (0 and 1)
+/// that were saved as they are: such a mask has no white.
 pub fn read_mask(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<f32>)> {
     let options = ReadOptions { data: true, ..any_aspect() };
+    let path = path.as_ref();
     let (grid, values, alpha) = match Content::read(path, &options)? {
-        Content::Display(image) => (image.grid(), image.values, image.known),
+        Content::Display(image) => {
+            let largest = image.values.as_flattened().iter().copied().fold(0.0, f32::max);
+            let is_one = |white: &f32| (largest * white - 1.0).abs() < 1e-3;
+            if let Some(white) = [255.0, 65535.0].into_iter().find(is_one) {
+                return Err(Error::invalid(format!(
+                    "the largest value of the mask is 1 of {white}: a mask is white, {white}, where something is known"
+                ))
+                .in_file(path));
+            }
+            (image.grid(), image.values, image.known)
+        }
         Content::Radiance(image) => (image.grid(), image.pixels, image.known),
     };
     // of grey the weights' sum could miss 1 by the last bit, and white must be known as a whole
     let grey = |[r, g, b]: [f32; 3]| if r == g && g == b { r } else { luminance([r, g, b]) };
-    let mut mask: Vec<f32> = values.into_iter().map(|p| grey(p).clamp(0.0, 1.0)).collect();
+    // NaN survives being clamped, but is not the larger of two
+    let share = |v: f32| v.clamp(0.0, 1.0).max(0.0);
+    let mut mask: Vec<f32> = values.into_iter().map(|p| share(grey(p))).collect();
     if let Some(alpha) = alpha {
-        mask.iter_mut().zip(alpha).for_each(|(m, a)| *m *= a.clamp(0.0, 1.0));
+        mask.iter_mut().zip(alpha).for_each(|(m, a)| *m *= share(a));
     }
     Ok(([grid.width, grid.height], mask))
 }
@@ -159,8 +174,42 @@ mod tests {
         let picture = picture.masked(&[0.5, 1.0]).unwrap().masked(&[0.5, 0.0]).unwrap();
         assert_eq!(picture.known(), Some(&[0.25, 0.0][..]));
         assert!(picture.masked(&[1.0]).unwrap_err().to_string().contains("mask of 1"));
+        let picture = Picture::new([2, 1], vec![[1.0; 3]; 2]).unwrap().masked(&[1.0, f32::NAN]).unwrap();
+        assert!(picture.known() == Some(&[1.0, 0.0][..]) && picture.is_partial());
         assert!(Picture::new([2, 2], vec![[1.0; 3]; 3]).is_err());
         assert!(Picture::new([0, 0], Vec::new()).is_err());
+    }
+
+    #[test]
+    fn truth_values_in_place_of_white_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mask.png");
+        let grey =
+            |bytes: [u8; 2]| image::GrayImage::from_raw(2, 1, bytes.to_vec()).unwrap().save(&path).unwrap();
+        grey([0, 1]);
+        let message = read_mask(&path).unwrap_err().to_string();
+        assert!(message.contains("mask.png: the largest value of the mask is 1 of 255"), "{message}");
+        for (values, mask) in
+            [([0, 2], [0.0, 2.0 / 255.0]), ([0, 0], [0.0; 2]), ([1, 255], [1.0 / 255.0, 1.0])]
+        {
+            grey(values);
+            assert_eq!(read_mask(&path).unwrap().1, mask);
+        }
+        let wide = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![0, 1]).unwrap();
+        wide.save(&path).unwrap();
+        assert!(read_mask(&path).unwrap_err().to_string().contains("is 1 of 65535"));
+    }
+
+    #[test]
+    fn what_is_not_a_number_in_a_mask_is_unknown() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mask.exr");
+        let values = [1.0, f32::NAN, 0.25, f32::INFINITY];
+        exr::prelude::write_rgb_file(&path, 4, 1, |x, _| (values[x], values[x], values[x])).unwrap();
+        assert_eq!(read_mask(&path).unwrap(), ([4, 1], vec![1.0, 0.0, 0.25, 1.0]));
+        // in one channel alone
+        exr::prelude::write_rgb_file(&path, 4, 1, |x, _| (1.0f32, values[x], 1.0f32)).unwrap();
+        assert_eq!(read_mask(&path).unwrap().1[..2], [1.0, 0.0]);
     }
 
     #[test]

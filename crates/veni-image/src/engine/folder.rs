@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use veni_light::output::{Overwrite, process_token, write_atomic};
+use veni_light::output::{Overwrite, OwnFolder, forget, part_beside, remember, write_atomic};
 
 use crate::{
     Error, HALF_ERROR, HalfRange, Panorama, Precision, Result, WriteFormat, WriteOptions, half_error,
@@ -13,7 +13,8 @@ use crate::{
 /// Files on their way into a folder: written beside it, then moved.
 pub(super) struct Folder {
     target: PathBuf,
-    staged: PathBuf,
+    overwrite: Overwrite,
+    staged: OwnFolder,
     names: Vec<String>,
 }
 
@@ -35,21 +36,31 @@ pub fn refuse_existing(folder: &Path, overwrite: Overwrite) -> Result<()> {
 impl Folder {
     pub(super) fn begin(target: &Path, overwrite: Overwrite) -> Result<Self> {
         refuse_existing(target, overwrite)?;
-        let name = (target.file_name())
-            .ok_or_else(|| Error::invalid("is not the name of a folder to make").in_file(target))?;
-        let staged =
-            target.with_file_name(format!(".{}.{:016x}.part", name.to_string_lossy(), process_token()));
-        fs::create_dir_all(&staged).map_err(|e| Error::io(target, "create", e))?;
-        Ok(Self { target: target.to_path_buf(), staged, names: Vec::new() })
+        let wrap = |e| Error::io(target, "create", e);
+        if let Some(above) = target.parent() {
+            fs::create_dir_all(above).map_err(wrap)?;
+        }
+        let staged = OwnFolder::create(|| {
+            let path = part_beside(target)?;
+            fs::create_dir(&path).map_err(wrap)?;
+            Ok(path)
+        })?;
+        Ok(Self { target: target.to_path_buf(), overwrite, staged, names: Vec::new() })
     }
 
     /// A file of these bytes.
     pub(super) fn add(&mut self, name: &str, bytes: impl AsRef<[u8]>) -> Result<()> {
         let wrap = |e| Error::io(self.target.join(name), "write", e);
-        let staged = self.staged.join(name);
+        let staged = self.staged.path().join(name);
         write_atomic(&staged, Overwrite::Refuse, |file| file.write_all(bytes.as_ref()).map_err(wrap))?;
-        self.names.push(name.to_owned());
+        self.added(name);
         Ok(())
+    }
+
+    /// On a signal it goes with the folder that it is in.
+    fn added(&mut self, name: &str) {
+        remember(&self.staged.path().join(name));
+        self.names.push(name.to_owned());
     }
 
     /// An image as EXR: in half precision where that keeps its values.
@@ -68,32 +79,29 @@ impl Folder {
         // what little it loses at the dark end is not a reason to refuse
         let half_range = HalfRange::Factor(1.0);
         let options = WriteOptions { half_range, colour, ..WriteOptions::new(WriteFormat::Exr(precision)) };
-        image.write(self.staged.join(name), &options)?;
-        self.names.push(name.to_owned());
+        image.write(self.staged.path().join(name), &options)?;
+        self.added(name);
         Ok(())
     }
 
-    /// Moves everything to its place.
-    pub(super) fn finish(self) -> Result<Vec<PathBuf>> {
-        if self.target.is_dir() && self.target.read_dir().is_ok_and(|mut entries| entries.next().is_none()) {
-            // an empty folder gives way to the new one
-            fs::remove_dir(&self.target).map_err(|e| Error::io(&self.target, "replace", e))?;
-        }
-        let wrap = |e| Error::io(&self.target, "write", e);
-        if self.target.exists() {
-            for name in &self.names {
-                fs::rename(self.staged.join(name), self.target.join(name)).map_err(wrap)?;
+    /// Moves everything to its place: in one step where nothing is there, else file by file if those there may be replaced.
+    pub(super) fn finish(mut self) -> Result<Vec<PathBuf>> {
+        let files = self.names.iter().map(|name| self.target.join(name)).collect();
+        match self.staged.publish(&self.target) {
+            Err(Error::Exists { .. }) if self.overwrite == Overwrite::Replace => {
+                for name in &self.names {
+                    fs::rename(self.staged.path().join(name), self.target.join(name))
+                        .map_err(|e| Error::io(&self.target, "write", e))?;
+                }
             }
-        } else {
-            fs::rename(&self.staged, &self.target).map_err(wrap)?;
+            published => published?,
         }
-        Ok(self.names.iter().map(|name| self.target.join(name)).collect())
+        Ok(files)
     }
 }
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // gone already if it became the target; otherwise nothing of a failure stays
-        let _ = fs::remove_dir_all(&self.staged);
+        self.names.iter().for_each(|name| forget(&self.staged.path().join(name)));
     }
 }

@@ -3,9 +3,18 @@
 use std::path::Path;
 
 use super::decode::{Decoded, decode};
-use super::{Kind, LdrPanorama, ReadOptions, declared, exr, first_bytes, format, hdr, kind, open, precheck};
+use super::{
+    Kind, LdrPanorama, ReadOptions, declared, exr, first_bytes, format, hdr, kind, kind_or, open, precheck,
+};
 use crate::panorama::Panorama;
 use crate::{Error, Result};
+
+/// What a file of none of the formats is not.
+const NONE: &str = if cfg!(feature = "avif") {
+    "neither an OpenEXR, a Radiance .hdr, a PNG, a JPEG, a WebP nor an AVIF file"
+} else {
+    "neither an OpenEXR, a Radiance .hdr, a PNG, a JPEG nor a WebP file"
+};
 
 /// What a picture file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +34,7 @@ impl Content {
         let path = path.as_ref();
         let read = || {
             let mut file = open(path)?;
-            let kind = kind(&mut file, path)?;
+            let kind = kind_or(&mut file, path, NONE)?;
             if !matches!(kind, Kind::Display(_)) {
                 precheck::budget(declared(&mut file, path)?, options)?;
             }
@@ -98,10 +107,12 @@ pub(super) fn radiance(path: &Path, options: &ReadOptions) -> Result<Panorama> {
     match kind {
         Kind::Exr => exr::read(file, path, options),
         Kind::Hdr => hdr::read(file, path, options),
-        // most hold none: what is wrong with those is not asked here
-        Kind::Display(format) => match decode(path, options) {
-            Ok(decoded) if decoded.is_high() => Ok(decoded.radiance()),
-            _ => Err(Error::LowRange { path: path.to_path_buf(), format }),
+        Kind::Display(format) => match decode(path, options)? {
+            decoded if decoded.is_high() => Ok(decoded.radiance()),
+            low => {
+                let notes = low.panorama.notes().to_vec();
+                Err(Error::LowRange { path: path.to_path_buf(), format, notes })
+            }
         },
     }
 }

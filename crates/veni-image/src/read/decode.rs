@@ -13,6 +13,7 @@ use super::display::{self, Tags};
 use super::gain_map::{self, Found, GainMap};
 use super::gpano::{Crop, Sphere};
 use super::meaning::{Curve, Meaning};
+use super::xmp::{self, Namespace};
 use super::{LdrPanorama, ReadOptions, Transfer, exif, first_bytes, jpeg, open, png, precheck, unknown};
 use crate::panorama::Panorama;
 use crate::{Error, Result};
@@ -100,12 +101,17 @@ pub(super) fn decode(path: &Path, options: &ReadOptions) -> Result<Decoded> {
                 return Err(Error::invalid("truncated JPEG file"));
             }
             let decoder = JpegDecoder::new(Cursor::new(&bytes)).map_err(wrap)?;
-            let tags = Tags { has_profile: jpeg::has_profile(&bytes), ..Tags::default() };
-            pixels(decoder, tags, Some(&bytes), options, wrap)
+            let tags = jpeg::tags(&bytes);
+            let decoded = pixels(decoder, tags, Some(&bytes), options, wrap)?;
+            jpeg::complete(&bytes).map(|()| decoded)
         }
         ImageFormat::WebP => {
-            let decoder = WebPDecoder::new(file).map_err(wrap)?;
-            let mut tags = Tags::default();
+            let mut decoder = WebPDecoder::new(file).map_err(wrap)?;
+            decoder.set_limits(limits(options)).map_err(wrap)?;
+            let exif = decoder.exif_metadata().map_err(wrap)?;
+            let packet = decoder.xmp_metadata().map_err(wrap)?;
+            let packets = packet.iter().map(|packet| xmp::text(packet)).collect();
+            let mut tags = Tags { exif, packets, ..Tags::default() };
             if decoder.has_animation() {
                 tags.notes.push("is animated (WebP): its first frame is taken".to_owned());
             }
@@ -135,8 +141,7 @@ fn pixels(
     wrap: impl Fn(ImageError) -> Error,
 ) -> Result<Decoded> {
     decoder.set_limits(limits(options)).map_err(&wrap)?;
-    tags.exif = decoder.exif_metadata().map_err(&wrap)?;
-    let orientation = tags.exif.as_deref().map_or(Orientation::NoTransforms, exif::orientation);
+    let orientation = orientation(&tags);
     let (width, height) = decoder.dimensions();
     let stored = [width as usize, height as usize];
     let [width, height] = if on_its_side(orientation) { [stored[1], stored[0]] } else { stored };
@@ -145,10 +150,7 @@ fn pixels(
         (None, None, Meaning { curve: Curve::Srgb, ..Meaning::default() });
     let mut sphere = Sphere::default();
     if !options.data {
-        // a packet that cannot be read says nothing
-        let packet = decoder.xmp_metadata().map_err(&wrap)?;
-        let packet = packet.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
-        sphere = Sphere::of(&packet, [width, height])?;
+        sphere = Sphere::of(&tags.packets, [width, height])?;
     }
     let grid = if let Some(part) = sphere.crop.take().filter(|_| !options.data) {
         if options.place_parts {
@@ -166,7 +168,7 @@ fn pixels(
         tags.icc = decoder.icc_profile().map_err(&wrap)?;
         meaning = display::meaning(&tags)?;
         if let Some(bytes) = jpeg {
-            match gain_map::find(bytes, stored)? {
+            match gain_map::find(bytes, &tags.packets, stored)? {
                 Found::Map(map) => gain_map = Some(map.oriented(orientation)),
                 Found::Note(note) => meaning.note(note),
                 Found::None => {}
@@ -178,6 +180,15 @@ fn pixels(
     image.apply_orientation(orientation);
     let (values, known) = values(grid, &image);
     Ok(Decoded { panorama: LdrPanorama { grid, values, known, meaning }, gain_map, crop })
+}
+
+/// By EXIF; where that says nothing, by XMP's copy of the same tag.
+fn orientation(tags: &Tags) -> Orientation {
+    let copy = || {
+        let code = Namespace::first(&tags.packets, xmp::TIFF)?.number("Orientation")?;
+        Orientation::from_exif(code as u8).filter(|_| code.fract() == 0.0)
+    };
+    tags.exif.as_deref().and_then(exif::orientation).or_else(copy).unwrap_or(Orientation::NoTransforms)
 }
 
 /// Whether turning the image upright exchanges its sides.

@@ -21,6 +21,8 @@ pub(super) struct Tags {
     /// PNG: (x, y) of red, green, blue, white.
     pub(super) chromaticities: Option<[[f64; 2]; 4]>,
     pub(super) exif: Option<Vec<u8>>,
+    /// All packets of XMP.
+    pub(super) packets: Vec<String>,
     /// What the reader noticed.
     pub(super) notes: Vec<String>,
 }

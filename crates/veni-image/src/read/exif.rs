@@ -18,9 +18,17 @@ fn body(exif: &[u8]) -> &[u8] {
     exif.strip_prefix(b"Exif\0\0").unwrap_or(exif)
 }
 
-/// How the picture is to be turned.
-pub(super) fn orientation(exif: &[u8]) -> Orientation {
-    Orientation::from_exif_chunk(body(exif)).unwrap_or(Orientation::NoTransforms)
+/// How the picture is to be turned, by tag 0x0112 of the first directory; nothing where it says none of the eight.
+pub(super) fn orientation(exif: &[u8]) -> Option<Orientation> {
+    let tiff = Tiff(body(exif));
+    let entry = tiff.whole(tiff.first()?, 0x0112)?;
+    // by the standard SHORT; some write LONG
+    let value = match tiff.short(&entry[2..])? {
+        3 => usize::from(tiff.short(&entry[8..])?),
+        4 => tiff.long(&entry[8..])?,
+        _ => return None,
+    };
+    Orientation::from_exif(u8::try_from(value).ok()?)
 }
 
 /// Tags 0xA001 (ColorSpace) of the Exif directory and 1 of the interoperability directory.
@@ -60,17 +68,26 @@ impl<'a> Tiff<'a> {
 
     /// The four bytes of an entry's value.
     fn entry(&self, directory: usize, tag: u16) -> Option<&'a [u8]> {
+        self.whole(directory, tag).map(|entry| &entry[8..])
+    }
+
+    /// The twelve bytes of an entry: tag, type, count, value.
+    fn whole(&self, directory: usize, tag: u16) -> Option<&'a [u8]> {
         let count = self.short(self.0.get(directory..)?)?;
         let mut entries =
             (0..usize::from(count)).map_while(|k| self.0.get(directory + 2 + 12 * k..)?.get(..12));
-        entries.find(|entry| self.short(entry) == Some(tag)).map(|entry| &entry[8..])
+        entries.find(|entry| self.short(entry) == Some(tag))
     }
 
     fn directory(&self, parent: usize, tag: u16) -> Option<usize> {
         self.long(self.entry(parent, tag)?)
     }
 
+    fn first(&self) -> Option<usize> {
+        self.long(self.0.get(4..)?)
+    }
+
     fn exif(&self) -> Option<usize> {
-        self.directory(self.long(self.0.get(4..)?)?, 0x8769)
+        self.directory(self.first()?, 0x8769)
     }
 }

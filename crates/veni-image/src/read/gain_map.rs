@@ -5,14 +5,15 @@
 //! L′ = (L + o_sdr) 2^(min + (max − min) g^(1/γ)) − o_hdr. White of the first picture stays 1.
 
 use std::io::Cursor;
+use std::path::Path;
 
 use image::codecs::jpeg::JpegDecoder;
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder};
+use image::{DynamicImage, ImageDecoder, ImageFormat};
 use rayon::prelude::*;
 
-use super::jpeg;
 use super::xmp::{APPLE_GAIN_MAP, GAIN_MAP, Namespace};
+use super::{jpeg, precheck};
 use crate::{Error, Result};
 
 /// What is said of a gain map.
@@ -40,12 +41,12 @@ struct Gain {
     after: f32,
 }
 
-/// Looks for the map behind a JPEG's first picture of `size` pixels.
+/// Looks for the map behind a JPEG's first picture of `size` pixels, which has these `packets` of XMP.
 ///
 /// # Errors
 /// [`Error::Unsupported`] where the first picture is the one of high dynamic range; [`Error::Invalid`] for a damaged map.
-pub(super) fn find(bytes: &[u8], size: [usize; 2]) -> Result<Found> {
-    let announced = jpeg::xmp(bytes).is_some_and(|packet| Namespace::find(packet, GAIN_MAP).is_some());
+pub(super) fn find(bytes: &[u8], packets: &[String], size: [usize; 2]) -> Result<Found> {
+    let announced = Namespace::first(packets, GAIN_MAP).is_some();
     let multiple =
         jpeg::segments(bytes).any(|(marker, content)| marker == 0xE2 && content.starts_with(b"MPF\0"));
     if !announced && !multiple && !jpeg::has_iso_gain_map(bytes) {
@@ -54,14 +55,13 @@ pub(super) fn find(bytes: &[u8], size: [usize; 2]) -> Result<Found> {
     let mut note = announced
         .then_some("says that it has a gain map (hdrgm), but no picture in it says how it is applied");
     for other in jpeg::others(bytes) {
-        if let Some(packet) = jpeg::xmp(other) {
-            if let Some(gain) = Namespace::find(packet, GAIN_MAP).filter(|g| g.number("GainMapMax").is_some())
-            {
-                return GainMap::read(&gain, other, size).map(|map| Found::Map(Box::new(map)));
-            }
-            if Namespace::find(packet, APPLE_GAIN_MAP).is_some() {
-                note = Some("has a gain map of Apple's kind, which is not applied");
-            }
+        let (packets, _) = jpeg::packets(other);
+        let mut gains = packets.iter().filter_map(|packet| Namespace::find(packet, GAIN_MAP));
+        if let Some(gain) = gains.find(|gain| gain.number("GainMapMax").is_some()) {
+            return GainMap::read(&gain, other, size).map(|map| Found::Map(Box::new(map)));
+        }
+        if Namespace::first(&packets, APPLE_GAIN_MAP).is_some() {
+            note = Some("has a gain map of Apple's kind, which is not applied");
         }
         if note.is_none() && jpeg::has_iso_gain_map(other) {
             note = Some("has a gain map by ISO 21496-1 without hdrgm values, which is not applied");
@@ -100,6 +100,9 @@ impl GainMap {
             )));
         }
         let damaged = |e: image::ImageError| Error::invalid(format!("its gain map is damaged: {e}"));
+        let incomplete = |e: Error| Error::invalid(format!("its gain map: {e}"));
+        // no limit was looked at behind the first picture
+        precheck::ldr(&mut Cursor::new(bytes), Path::new(""), ImageFormat::Jpeg).map_err(incomplete)?;
         let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(damaged)?;
         let (width, height) = decoder.dimensions();
         if width == 0 || height == 0 || width as usize > size[0] || height as usize > size[1] {
@@ -111,6 +114,7 @@ impl GainMap {
         if !jpeg::ends(bytes) {
             return Err(Error::invalid("its gain map is truncated"));
         }
+        jpeg::complete(bytes).map_err(incomplete)?;
         let image = DynamicImage::from_decoder(decoder).map_err(damaged)?;
         let channels = [0, 1, 2].map(|c| Gain {
             least: least[c],

@@ -21,13 +21,13 @@ pub(super) struct Crop {
 }
 
 impl Sphere {
-    /// From a packet, for a file of `size` pixels; nothing where it says nothing.
+    /// From a file's packets, for `size` pixels; nothing where they say nothing.
     ///
     /// # Errors
     /// [`Error::Unsupported`] for other projections, [`Error::Invalid`] for a part that sticks out of its whole, or whose place is
     /// not given in numbers.
-    pub(super) fn of(packet: &str, size: [usize; 2]) -> Result<Self> {
-        let Some(gpano) = Namespace::find(packet, GPANO) else { return Ok(Self::default()) };
+    pub(super) fn of(packets: &[String], size: [usize; 2]) -> Result<Self> {
+        let Some(gpano) = Namespace::first(packets, GPANO) else { return Ok(Self::default()) };
         if let Some(projection) = gpano.text("ProjectionType")
             && !projection.eq_ignore_ascii_case("equirectangular")
         {

@@ -21,8 +21,10 @@ const LARGEST: usize = 1 << 24;
 /// What an embedded profile says of red, green and blue; grey values are all three.
 ///
 /// # Errors
-/// [`Error::Unsupported`] by the profile's name for RGB profiles without matrix and curves, [`Error::Invalid`] for damaged ones.
+/// [`Error::Unsupported`] by the profile's name for RGB profiles without matrix and curves, or with tables, which go before them;
+/// [`Error::Invalid`] for damaged ones.
 pub(super) fn meaning(profile: &[u8]) -> Result<Meaning> {
+    let has_tables = has_tables(profile);
     let options = ParsingOptions { max_profile_size: LARGEST, ..ParsingOptions::default() };
     let profile = ColorProfile::new_from_slice_with_options(profile, options)
         .map_err(|e| Error::invalid(format!("damaged ICC profile: {e}")))?;
@@ -41,6 +43,9 @@ pub(super) fn meaning(profile: &[u8]) -> Result<Meaning> {
         )))
     };
     let (curves, matrix) = match profile.color_space {
+        DataColorSpace::Gray | DataColorSpace::Rgb if has_tables => {
+            return unsupported("maps colours by tables");
+        }
         DataColorSpace::Gray => match &profile.gray_trc {
             Some(curve) => ([curve, curve, curve], None),
             None => return unsupported("has no grey curve"),
@@ -64,11 +69,26 @@ pub(super) fn meaning(profile: &[u8]) -> Result<Meaning> {
         }
         other => return unsupported(&format!("is for {other:?} values")),
     };
-    Ok(Meaning { curve: curve(curves, &name)?, matrix, ..Meaning::default() })
+    let (curve, high) = curve(curves, &name)?;
+    let mut meaning = Meaning { curve, matrix, ..Meaning::default() };
+    if let Some(high) = high {
+        meaning.note(format!(
+            "its ICC profile {name:?} has the curve of {high} without code points (cicp) that say so: its largest value is taken for a display's white"
+        ));
+    }
+    Ok(meaning)
 }
 
-/// One curve for three channels, by its short name where it has one.
-fn curve(curves: [&ToneReprCurve; 3], name: &str) -> Result<Curve> {
+/// Whether there are tables to the connection space (ICC.1:2022, 8.3.2 and 8.4.2 put them before curves and matrix).
+fn has_tables(profile: &[u8]) -> bool {
+    let names = profile.get(132..).unwrap_or_default().as_chunks::<12>().0;
+    let count = profile.get(128..132).and_then(|n| n.first_chunk()).map_or(0, |n| u32::from_be_bytes(*n));
+    let count = usize::try_from(count).map_or(names.len(), |count| count.min(names.len()));
+    names[..count].iter().any(|tag| matches!(tag, [b'A' | b'D', b'2', b'B', b'0'..=b'3', ..]))
+}
+
+/// One curve for three channels, by its short name where it has one; and which curve of high dynamic range it is.
+fn curve(curves: [&ToneReprCurve; 3], name: &str) -> Result<(Curve, Option<&'static str>)> {
     let mut tables = [const { Vec::new() }; 3];
     for (table, curve) in tables.iter_mut().zip(curves) {
         let broken = || Error::invalid(format!("damaged ICC profile {name:?}: a curve without values"));
@@ -86,13 +106,20 @@ fn curve(curves: [&ToneReprCurve; 3], name: &str) -> Result<Curve> {
         let mut all = tables.iter().flat_map(|table| table.iter().enumerate());
         all.all(|(k, v)| (v - curve(k as f32 / step)).abs() < SAME)
     };
-    Ok(if follows(srgb_to_linear) {
-        Curve::Srgb
-    } else if follows(|v| v) {
-        Curve::Linear
+    if follows(srgb_to_linear) {
+        return Ok((Curve::Srgb, None));
+    }
+    if follows(|v| v) {
+        return Ok((Curve::Linear, None));
+    }
+    let high = if follows(|v| Curve::Pq.linear(0, v) / Curve::Pq.linear(0, 1.0)) {
+        Some("PQ")
+    } else if follows(|v| Curve::Hlg.linear(0, v) / Curve::Hlg.linear(0, 1.0)) {
+        Some("HLG")
     } else {
-        Curve::Table(Arc::new(tables))
-    })
+        None
+    };
+    Ok((Curve::Table(Arc::new(tables)), high))
 }
 
 fn name(profile: &ColorProfile) -> String {

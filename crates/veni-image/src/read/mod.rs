@@ -255,8 +255,13 @@ fn first_bytes(file: &mut (impl Read + Seek), path: &Path) -> Result<Vec<u8>> {
     Ok(start)
 }
 
-/// Recognises a format and rewinds.
+/// Recognises a format and rewinds; where radiance is wanted.
 fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
+    kind_or(file, path, "neither an OpenEXR nor a Radiance .hdr file")
+}
+
+/// Recognises a format and rewinds; `otherwise` says what the content is not.
+fn kind_or(file: &mut (impl Read + Seek), path: &Path, otherwise: &str) -> Result<Kind> {
     let start = first_bytes(file, path)?;
     if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
         precheck::exr(file, path)?;
@@ -269,7 +274,7 @@ fn kind(file: &mut (impl Read + Seek), path: &Path) -> Result<Kind> {
     if let Some((_, format)) = format(&start) {
         return Ok(Kind::Display(format));
     }
-    Err(unknown(&start, "neither an OpenEXR nor a Radiance .hdr file"))
+    Err(unknown(&start, otherwise))
 }
 
 /// Whether a name stands at a place.

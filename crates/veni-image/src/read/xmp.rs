@@ -10,6 +10,36 @@ pub(super) const GAIN_MAP: &str = "http://ns.adobe.com/hdr-gain-map/1.0/";
 /// Apple's gain maps.
 pub(super) const APPLE_GAIN_MAP: &str = "http://ns.apple.com/HDRGainMap/1.0/";
 
+/// Adobe's notes, which name the rest of a packet that is too long for a segment of JPEG.
+pub(super) const EXTENSION: &str = "http://ns.adobe.com/xmp/note/";
+/// TIFF's tags as properties.
+pub(super) const TIFF: &str = "http://ns.adobe.com/tiff/1.0/";
+
+/// The text of a packet: UTF-8, or by its first bytes UTF-16 or UTF-32 (ISO 16684-1, 7.1). What is none becomes U+FFFD: one
+/// wrong byte in a title is no reason to forget where the picture lies in its panorama.
+pub(super) fn text(bytes: &[u8]) -> String {
+    let units = |rest: &[u8], unit: fn([u8; 2]) -> u16| -> String {
+        let units = rest.as_chunks().0.iter().map(|pair| unit(*pair));
+        char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
+    };
+    let points = |rest: &[u8], point: fn([u8; 4]) -> u32| -> String {
+        let points = rest.as_chunks().0.iter().map(|four| point(*four));
+        points.map(|p| char::from_u32(p).unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
+    };
+    match bytes {
+        // with a mark of the byte order in front, or where that stands in the packet's first line, with its first letter
+        [0xFF, 0xFE, 0, 0, rest @ ..] => points(rest, u32::from_le_bytes),
+        [0, 0, 0xFE, 0xFF, rest @ ..] => points(rest, u32::from_be_bytes),
+        [b'<', 0, 0, 0, ..] => points(bytes, u32::from_le_bytes),
+        [0, 0, 0, b'<', ..] => points(bytes, u32::from_be_bytes),
+        [0xFF, 0xFE, rest @ ..] => units(rest, u16::from_le_bytes),
+        [0xFE, 0xFF, rest @ ..] => units(rest, u16::from_be_bytes),
+        [b'<', 0, ..] => units(bytes, u16::from_le_bytes),
+        [0, b'<', ..] => units(bytes, u16::from_be_bytes),
+        _ => String::from_utf8_lossy(bytes).into_owned(),
+    }
+}
+
 /// One namespace of a packet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Namespace<'a> {
@@ -29,6 +59,11 @@ impl<'a> Namespace<'a> {
             (closed && is_name).then_some(prefix)
         });
         at.map(|prefix| Self { packet, prefix })
+    }
+
+    /// Of the first of several packets that names it.
+    pub(super) fn first(packets: &'a [String], uri: &str) -> Option<Self> {
+        packets.iter().find_map(|packet| Self::find(packet, uri))
     }
 
     /// The text of a property.
@@ -64,6 +99,26 @@ impl<'a> Namespace<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn packets_are_text_in_every_encoding() {
+        let words = "<?xpacket begin='\u{FEFF}'?> café 🌞";
+        let wide = |mark: &str, unit: fn(u16) -> [u8; 2]| -> Vec<u8> {
+            format!("{mark}{words}").encode_utf16().flat_map(unit).collect()
+        };
+        let wider = |mark: &str, point: fn(u32) -> [u8; 4]| -> Vec<u8> {
+            format!("{mark}{words}").chars().flat_map(|c| point(c as u32)).collect()
+        };
+        assert_eq!(text(words.as_bytes()), words);
+        for mark in ["", "\u{FEFF}"] {
+            assert_eq!(text(&wide(mark, u16::to_le_bytes)), words);
+            assert_eq!(text(&wide(mark, u16::to_be_bytes)), words);
+            assert_eq!(text(&wider(mark, u32::to_le_bytes)), words);
+            assert_eq!(text(&wider(mark, u32::to_be_bytes)), words);
+        }
+        assert_eq!(text(b"<a>caf\xe9</a>"), "<a>caf\u{FFFD}</a>");
+        assert_eq!(text(b"<\0a"), "<");
+    }
 
     #[test]
     fn attributes_elements_and_lists() {

@@ -5,7 +5,7 @@ use moxcms::ColorProfile;
 
 use super::super::super::*;
 use super::Case;
-use super::files::{File, close, encoded, exif, hundred_thousandths, jpeg, png, png_icc, segment, xmp};
+use super::files::{File, close, encoded, exif, hundred_thousandths, jpeg, png, png_icc, segment, webp, xmp};
 use crate::tonemap::srgb_to_linear;
 
 pub(super) const CASES: &[Case] = &[
@@ -16,7 +16,8 @@ pub(super) const CASES: &[Case] = &[
     ("PNG", "cHRM", chrm),
     ("PNG", "acTL (animated)", apng),
     ("PNG, JPEG, WebP", "ICC profile: matrix and curves, or grey", icc),
-    ("PNG, JPEG, WebP", "ICC profile of another kind (tables)", foreign_icc),
+    ("PNG, JPEG, WebP", "ICC profile of another kind (tables, also beside a matrix)", foreign_icc),
+    ("PNG, JPEG, WebP", "ICC profile with the curve of PQ or HLG, without cicp", unnamed_curve),
     ("PNG, JPEG, WebP", "EXIF Orientation", orientation),
     ("PNG, JPEG, WebP", "EXIF ColorSpace = Adobe RGB (or R03)", adobe),
     ("PNG, JPEG, WebP", "EXIF ColorSpace = uncalibrated", uncalibrated),
@@ -139,22 +140,6 @@ fn icc() {
     close(File::new(&webp(&image, b"ICCP", &p3, 0x20)).first(), expected);
 }
 
-/// A WebP file in the extended layout with one more chunk (RFC 9649, section 2.7).
-fn webp(image: &DynamicImage, name: &[u8; 4], content: &[u8], flag: u8) -> Vec<u8> {
-    let simple = encoded(image, ImageFormat::WebP);
-    let mut extended = b"WEBPVP8X\x0a\0\0\0".to_vec();
-    extended.extend([flag, 0, 0, 0]);
-    for side in [image.width(), image.height()] {
-        extended.extend(&(side - 1).to_le_bytes()[..3]);
-    }
-    extended.extend(name);
-    extended.extend(u32::try_from(content.len()).unwrap().to_le_bytes());
-    extended.extend(content);
-    extended.extend(std::iter::repeat_n(0, content.len() % 2));
-    extended.extend(&simple[12..]);
-    [b"RIFF".as_slice(), &u32::try_from(extended.len()).unwrap().to_le_bytes(), &extended].concat()
-}
-
 /// A profile without its three curves, as one has that maps by tables.
 fn foreign_icc() {
     let mut plain = ColorProfile::new_display_p3();
@@ -168,6 +153,63 @@ fn foreign_icc() {
     assert!(error.contains("ICC profile") && error.contains("Display P3"), "{error}");
     let error = png_icc(COLOUR, &profile[..100], &[]).error();
     assert!(error.contains("damaged ICC profile"), "{error}");
+    // tables beside the matrix: 8 bits, three channels to three, two points to a side (ICC.1:2022, 10.11)
+    let unit = [65536, 0, 0, 0, 65536, 0, 0, 0, 65536].map(u32::to_be_bytes).concat();
+    let line: Vec<u8> = (0..=255).collect();
+    let table =
+        [&b"mft1\0\0\0\0\x03\x03\x02\0"[..], &unit, &line.repeat(3), &[128; 24], &line.repeat(3)].concat();
+    for name in [b"A2B0", b"D2B1"] {
+        let error = png_icc(COLOUR, &with_tag(&plain.encode().unwrap(), name, &table), &[]).error();
+        assert!(error.contains("Display P3") && error.contains("tables"), "{error}");
+    }
+    // those that lead back from colours are nobody's business here
+    let back = with_tag(&plain.encode().unwrap(), b"B2A0", &table);
+    close(png_icc(COLOUR, &back, &[]).first(), from_p3(COLOUR.map(srgb_to_linear)));
+}
+
+/// A profile with one more tag, at the end.
+fn with_tag(profile: &[u8], name: &[u8; 4], content: &[u8]) -> Vec<u8> {
+    let number = |at: usize| u32::from_be_bytes(profile[at..at + 4].try_into().unwrap());
+    let end = 132 + 12 * number(128) as usize;
+    let mut grown = profile[..end].to_vec();
+    // what is there moves by the new entry
+    for at in (136..end).step_by(12) {
+        grown[at..at + 4].copy_from_slice(&(number(at) + 12).to_be_bytes());
+    }
+    grown[128..132].copy_from_slice(&(number(128) + 1).to_be_bytes());
+    grown.extend(name);
+    grown.extend([profile.len() as u32 + 12, content.len() as u32].map(u32::to_be_bytes).concat());
+    grown.extend(&profile[end..]);
+    grown.extend(content);
+    let length = (grown.len() as u32).to_be_bytes();
+    grown[..4].copy_from_slice(&length);
+    grown
+}
+
+/// Curves of high dynamic range in tables of 16 bits, as some programs write them.
+fn unnamed_curve() {
+    let table = |curve: fn(f64) -> f64| {
+        let entry = |k: u16| (curve(f64::from(k) / 4095.0) * 65535.0).round() as u16;
+        let mut profile = ColorProfile::new_srgb();
+        let curve = Some(moxcms::ToneReprCurve::Lut((0..4096).map(entry).collect()));
+        (profile.red_trc, profile.green_trc, profile.blue_trc) = (curve.clone(), curve.clone(), curve);
+        profile.cicp = None;
+        png_icc([0.75; 3], &profile.encode().unwrap(), &[])
+    };
+    // ST 2084, equation 4.1, and ARIB STD-B67
+    let pq = table(|v| {
+        let power = v.powf(32.0 / 2523.0);
+        ((power - 0.835_937_5).max(0.0) / (18.851_562_5 - 18.6875 * power)).powf(8192.0 / 1305.0)
+    });
+    let hlg = table(|v| {
+        if v <= 0.5 { v * v / 3.0 } else { (((v - 0.559_910_73) / 0.178_832_77).exp() + 0.284_668_92) / 12.0 }
+    });
+    // 983 of 10,000 cd/m², and 0.265 of the peak
+    for (file, name, value) in [(pq, "PQ", 0.0983), (hlg, "HLG", 0.2650)] {
+        assert!((file.first()[1] - value).abs() < 1e-3, "{name}: {:?}", file.first());
+        assert!(file.notes().contains(&format!("curve of {name} without")), "{}", file.notes());
+    }
+    assert_eq!(table(|v| v.powf(2.2)).notes(), "");
 }
 
 fn orientation() {

@@ -21,6 +21,10 @@ pub(super) const CASES: &[Case] = &[
     ("EXR", "pixelAspectRatio", aspect),
     ("EXR", "alpha", alpha),
     ("EXR", "alpha of 0 everywhere beside colours", no_alpha),
+    ("EXR", "alpha below 1/64 under a colour", hidden),
+    ("EXR", "half precision, infinite", beyond),
+    ("EXR", "chromaticities of eight zeros", unsaid),
+    ("EXR", "Orientation", orientation),
     ("EXR", "data window", window),
     ("EXR", "veni:radianceScale", scale),
 ];
@@ -145,7 +149,7 @@ fn known(file: &File) -> Option<Vec<f32>> {
 fn alpha() {
     let half = file(RED, Some(0.5), |_, _| ());
     close(half.first(), RED.map(|v| 2.0 * v));
-    assert_eq!(known(&half), Some(vec![0.5; 32]));
+    assert_eq!(known(&half), None);
     let whole = file(RED, Some(1.0), |_, _| ());
     assert_eq!((whole.first(), known(&whole)), (RED, None));
     let nothing = file([0.0; 3], Some(0.0), |_, _| ());
@@ -170,10 +174,66 @@ fn alpha() {
     assert_eq!(file.linear().0[3], [0.0; 3]);
 }
 
+fn hidden() {
+    let file = File::empty();
+    let plane = |value: f32| FlatSamples::F32(vec![value; 32]);
+    let half = (0..32)
+        .map(|at| {
+            if at < 4 {
+                0.0
+            } else if at < 8 {
+                1e-4
+            } else {
+                1.0
+            }
+        })
+        .collect();
+    let channels =
+        vec![("R", plane(0.5)), ("G", plane(0.5)), ("B", plane(0.5)), ("A", FlatSamples::F32(half))];
+    exr_file(file.path(), (8, 4), channels, Encoding::FAST_LOSSLESS, |_, _| ());
+    assert!(file.notes().contains("25.0 % of its pixels have a colour"), "{}", file.notes());
+    assert_eq!(known(&file).unwrap().iter().sum::<f32>(), 24.0);
+}
+
+fn beyond() {
+    let file = File::empty();
+    let plane = |first: f16| {
+        let mut values = vec![f16::ONE; 32];
+        values[0] = first;
+        FlatSamples::F16(values)
+    };
+    let channels = vec![("R", plane(f16::INFINITY)), ("G", plane(f16::INFINITY)), ("B", plane(f16::ONE))];
+    exr_file(file.path(), (8, 4), channels, Encoding::FAST_LOSSLESS, |_, _| ());
+    assert_eq!(file.first(), [65504.0, 65504.0, 1.0]);
+    assert!(file.notes().contains("2 values are infinite"), "{}", file.notes());
+}
+
+fn unsaid() {
+    let file = file(RED, None, primaries([[0.0; 2]; 4]));
+    assert!(file.first() == RED && file.notes().contains("all 0"), "{}", file.notes());
+}
+
+fn orientation() {
+    let of = |at| {
+        file(RED, None, move |_, own| {
+            own.other.insert("Orientation".into(), AttributeValue::I32(at));
+        })
+    };
+    let turned = of(6);
+    assert!(turned.first() == RED && turned.notes().contains("Orientation = 6"), "{}", turned.notes());
+    assert_eq!(of(1).notes(), "");
+}
+
 fn no_alpha() {
     let file = file(RED, Some(0.0), |_, _| ());
     assert_eq!((file.first(), known(&file)), (RED, None));
     assert!(file.notes().contains("alpha"), "{}", file.notes());
+    // outside of what the file holds nothing is known all the same
+    let part = self::file(RED, Some(0.0), |shared, own| {
+        own.layer_position = Vec2(2, 1);
+        shared.display_window = IntegerBounds::from_dimensions(Vec2(12, 6));
+    });
+    assert_eq!(known(&part).unwrap().iter().sum::<f32>(), 32.0);
 }
 
 fn window() {

@@ -74,21 +74,32 @@ pub(super) fn encoded(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
     bytes
 }
 
+/// A chunk of a PNG.
+pub(super) fn chunk(name: &[u8; 4], content: &[u8]) -> Vec<u8> {
+    let body = [name.as_slice(), content].concat();
+    [&u32::try_from(content.len()).unwrap().to_be_bytes()[..], &body, &crc(&body).to_be_bytes()].concat()
+}
+
+/// A PNG with whole chunks behind its header, and others behind its pixels.
+pub(super) fn png_around(image: &DynamicImage, before: &[Vec<u8>], behind: &[Vec<u8>]) -> File {
+    let mut bytes = encoded(image, ImageFormat::Png);
+    // 12 bytes of IEND
+    bytes.splice(bytes.len() - 12..bytes.len() - 12, behind.concat());
+    // 8 bytes of signature and 25 of IHDR
+    bytes.splice(33..33, before.concat());
+    File::new(&bytes)
+}
+
+/// A picture of 16 bits, 8 × 4, of one colour.
+pub(super) fn plain(colour: [f32; 3]) -> DynamicImage {
+    let pixel = image::Rgb(colour.map(|v| (v * 65535.0).round() as u16));
+    DynamicImage::ImageRgb16(image::ImageBuffer::from_pixel(8, 4, pixel))
+}
+
 /// A PNG of 16 bits, 8 × 4, of one colour, with chunks behind its header.
 pub(super) fn png(colour: [f32; 3], chunks: &[(&[u8; 4], &[u8])]) -> File {
-    let pixel = image::Rgb(colour.map(|v| (v * 65535.0).round() as u16));
-    let image = DynamicImage::ImageRgb16(image::ImageBuffer::from_pixel(8, 4, pixel));
-    let mut bytes = encoded(&image, ImageFormat::Png);
-    let mut all = Vec::new();
-    for (name, content) in chunks {
-        let body = [name.as_slice(), content].concat();
-        all.extend(u32::try_from(content.len()).unwrap().to_be_bytes());
-        all.extend(&body);
-        all.extend(crc(&body).to_be_bytes());
-    }
-    // 8 bytes of signature and 25 of IHDR
-    bytes.splice(33..33, all);
-    File::new(&bytes)
+    let chunks: Vec<_> = chunks.iter().map(|(name, content)| chunk(name, content)).collect();
+    png_around(&plain(colour), &chunks, &[])
 }
 
 /// A PNG with a profile.
@@ -118,13 +129,22 @@ pub(super) fn jpeg(image: &DynamicImage, segments: &[Vec<u8>]) -> Vec<u8> {
     bytes
 }
 
-/// An XMP packet as a JPEG's segment.
-pub(super) fn xmp(namespace: &str, prefix: &str, properties: &str) -> Vec<u8> {
-    let packet = format!(
+/// An XMP packet of one namespace.
+pub(super) fn packet(namespace: &str, prefix: &str, properties: &str) -> String {
+    format!(
         "<x:xmpmeta xmlns:x='adobe:ns:meta/'><rdf:RDF xmlns:rdf='http://www.w3.org/1999/02/22-rdf-syntax-ns#'>\
          <rdf:Description xmlns:{prefix}='{namespace}' {properties}/></rdf:RDF></x:xmpmeta>"
-    );
-    segment(0xE1, &[b"http://ns.adobe.com/xap/1.0/\0", packet.as_bytes()].concat())
+    )
+}
+
+/// An XMP packet as a JPEG's segment.
+pub(super) fn xmp_segment(packet: &[u8]) -> Vec<u8> {
+    segment(0xE1, &[b"http://ns.adobe.com/xap/1.0/\0", packet].concat())
+}
+
+/// The same of one namespace.
+pub(super) fn xmp(namespace: &str, prefix: &str, properties: &str) -> Vec<u8> {
+    xmp_segment(packet(namespace, prefix, properties).as_bytes())
 }
 
 /// EXIF of one directory: orientation; and of the Exif directory: colour space and interoperability index.
@@ -148,4 +168,20 @@ pub(super) fn exif(orientation: u8, colour_space: u16, interoperability: &[u8; 4
     ]));
     tiff.extend(directory(&[entry(1, 2, 4, *interoperability)]));
     tiff
+}
+
+/// A WebP file in the extended layout with one more chunk (RFC 9649, section 2.7).
+pub(super) fn webp(image: &DynamicImage, name: &[u8; 4], content: &[u8], flag: u8) -> Vec<u8> {
+    let simple = encoded(image, ImageFormat::WebP);
+    let mut extended = b"WEBPVP8X\x0a\0\0\0".to_vec();
+    extended.extend([flag, 0, 0, 0]);
+    for side in [image.width(), image.height()] {
+        extended.extend(&(side - 1).to_le_bytes()[..3]);
+    }
+    extended.extend(name);
+    extended.extend(u32::try_from(content.len()).unwrap().to_le_bytes());
+    extended.extend(content);
+    extended.extend(std::iter::repeat_n(0, content.len() % 2));
+    extended.extend(&simple[12..]);
+    [b"RIFF".as_slice(), &u32::try_from(extended.len()).unwrap().to_le_bytes(), &extended].concat()
 }

@@ -12,6 +12,9 @@ pub(super) const CASES: &[Case] = &[
     ("JPEG", "gain map without hdrgm values (Apple, ISO 21496-1)", foreign),
     ("JPEG", "gain map to limited range (BaseRenditionIsHDR)", backwards),
     ("JPEG", "CMYK profile", cmyk),
+    ("JPEG", "picture data that end early, also a gain map's", early),
+    ("JPEG", "arithmetic, lossless, hierarchical coding, 12 bits, JPEG-LS", coding),
+    ("JPEG", "sampling factors", sampling),
 ];
 
 const HDRGM: &str = "http://ns.adobe.com/hdr-gain-map/1.0/";
@@ -60,6 +63,8 @@ fn foreign() {
     let multiple = segment(0xE2, b"MPF\0");
     let file = File::new(&[jpeg(&base(), &[multiple]), jpeg(&map(), &[apple])].concat());
     assert!(file.notes().contains("Apple"), "{}", file.notes());
+    let error = Panorama::read(file.path()).unwrap_err().to_string();
+    assert!(error.contains("no high dynamic range (has a gain map of Apple's kind"), "{error}");
     let iso = segment(0xE2, b"urn:iso:std:iso:ts:21496:-1\0\0\0\0\0");
     let file = File::new(&[jpeg(&base(), std::slice::from_ref(&iso)), jpeg(&map(), &[iso])].concat());
     assert!(file.notes().contains("21496"), "{}", file.notes());
@@ -130,4 +135,58 @@ fn cmyk() {
     let file =
         File::new(&jpeg(&base(), &[segment(0xE2, &[b"ICC_PROFILE\0\x01\x01", profile.as_slice()].concat())]));
     assert!(file.notes().contains("CMYK"), "{}", file.notes());
+}
+
+/// What an end marker behind half of the data hides, in the picture and in its gain map.
+fn early() {
+    let ended = |bytes: &[u8], cut: usize| File::new(&[&bytes[..cut], &[0xFF, 0xD9]].concat());
+    let first = jpeg(&base(), &[xmp(HDRGM, "hdrgm", "hdrgm:Version='1.0'")]);
+    let second = jpeg(&map(), &[xmp(HDRGM, "hdrgm", "hdrgm:GainMapMax='3'")]);
+    let error = ended(&first, first.len() - 5).error();
+    assert!(error.contains("truncated JPEG file") && error.contains("of 2 blocks"), "{error}");
+    let both = [first, second].concat();
+    let error = ended(&both, both.len() - 5).error();
+    assert!(error.contains("its gain map") && error.contains("of 1 blocks"), "{error}");
+    // to those who ask for radiance alone too
+    let error = Panorama::read(ended(&both, both.len() - 5).path()).unwrap_err().to_string();
+    assert!(error.contains("its gain map"), "{error}");
+}
+
+/// A frame header of components with these factors, and nothing behind it.
+fn frame(marker: u8, bits: u8, factors: &[u8]) -> File {
+    let components: Vec<u8> = (1..).zip(factors).flat_map(|(id, factor)| [id, *factor, 0]).collect();
+    let head = [bits, 0, 8, 0, 16, factors.len() as u8];
+    File::new(
+        &[&[0xFF, 0xD8][..], &segment(marker, &[&head[..], &components].concat()), &[0xFF, 0xD9]].concat(),
+    )
+}
+
+fn coding() {
+    for (marker, bits, word) in [
+        (0xC9, 8, "arithmetically"),
+        (0xCA, 8, "arithmetically"),
+        (0xC3, 16, "without loss"),
+        (0xC1, 12, "12 bits"),
+        (0xC5, 8, "hierarchy"),
+        (0xF7, 8, "JPEG-LS"),
+    ] {
+        let error = frame(marker, bits, &[0x11]).error();
+        assert!(error.contains(word) && !error.contains("damaged"), "{error}");
+    }
+}
+
+fn sampling() {
+    for (factors, words) in [
+        (&[0x11, 0x21, 0x21][..], "1x1, 2x1, 2x1"),
+        (&[0x31, 0x11, 0x11], "3x1, 1x1, 1x1"),
+        (&[0x22, 0x11, 0x41], "2x2, 1x1, 4x1"),
+        (&[0x14, 0x12, 0x12], "1x4, 1x2, 1x2"),
+    ] {
+        let error = frame(0xC0, 8, factors).error();
+        assert!(error.contains(words) && !error.contains("damaged"), "{error}");
+    }
+    for read in [&[0x11][..], &[0x22], &[0x22, 0x11, 0x11], &[0x11, 0x12, 0x12], &[0x22, 0x21, 0x12]] {
+        let error = frame(0xC0, 8, read).error();
+        assert!(!error.contains("sampling"), "{error}");
+    }
 }

@@ -4,7 +4,9 @@ mod display;
 mod exr;
 mod files;
 mod jpeg;
+mod png;
 mod radiance;
+mod xmp;
 
 use std::collections::BTreeSet;
 
@@ -40,12 +42,22 @@ fn jpeg_rows() {
     run(jpeg::CASES);
 }
 
+#[test]
+fn png_rows() {
+    run(png::CASES);
+}
+
+#[test]
+fn xmp_rows() {
+    run(xmp::CASES);
+}
+
 /// AVIF has its cases beside its reader, where its files are.
 #[test]
 fn every_row_has_a_case_and_every_case_a_row() {
     let rows: BTreeSet<_> = METADATA.iter().map(|row| (row.format, row.tag)).collect();
     assert_eq!(rows.len(), METADATA.len(), "a row stands twice");
-    let cases = [exr::CASES, radiance::CASES, display::CASES, jpeg::CASES].concat();
+    let cases = [exr::CASES, radiance::CASES, display::CASES, jpeg::CASES, png::CASES, xmp::CASES].concat();
     let cases: BTreeSet<_> = cases.into_iter().map(|(format, tag, _)| (format, tag)).collect();
     let rows: BTreeSet<_> = rows.into_iter().filter(|(format, _)| *format != "AVIF").collect();
     assert_eq!(cases, rows);

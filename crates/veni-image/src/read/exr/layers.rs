@@ -24,6 +24,8 @@ pub(super) struct Choice {
     pub(super) alpha: Option<usize>,
     /// Whether there are three channels, and not one for all.
     pub(super) coloured: bool,
+    /// Vectors or the like, not light.
+    pub(super) data: bool,
 }
 
 struct Layer {
@@ -49,12 +51,13 @@ impl Layer {
     }
 }
 
-/// Candidates are all prefixes that have R, G and B (or Y alone): the one asked for; else the one without a prefix, else the
-/// one that is called like a picture, else the only one.
+/// Candidates are all prefixes that have R, G and B (or Y alone): the one asked for; else the coloured one without a prefix, else
+/// the coloured one that is called like a picture, else the same of single channels where nothing is coloured (a Y beside
+/// coloured layers is as likely a depth), else the only one.
 pub(super) fn choose(headers: &[Header], options: &ReadOptions) -> Result<Choice> {
     let mut found = Vec::new();
     for (part, header) in headers.iter().enumerate() {
-        layers(part, header, &mut found)?;
+        layers(part, header, options.data, &mut found)?;
     }
     let names = || {
         let mut names: Vec<String> = found.iter().filter(|l| !l.vector).map(Layer::name).collect();
@@ -72,8 +75,10 @@ pub(super) fn choose(headers: &[Header], options: &ReadOptions) -> Result<Choice
         let mut all = pictures.iter().filter(|layer| wanted(layer));
         all.next().filter(|_| all.next().is_none())
     };
-    let chosen = only(&|layer| layer.prefix.is_empty())
-        .or_else(|| only(&|layer| layer.is_beauty()))
+    let coloured = pictures.iter().any(|layer| layer.choice.coloured);
+    let best = |layer: &Layer| layer.choice.coloured == coloured;
+    let chosen = only(&|layer| best(layer) && layer.prefix.is_empty())
+        .or_else(|| only(&|layer| best(layer) && layer.is_beauty()))
         .or_else(|| only(&|_| true));
     match chosen {
         Some(layer) => Ok(layer.choice.clone()),
@@ -90,7 +95,7 @@ pub(super) fn choose(headers: &[Header], options: &ReadOptions) -> Result<Choice
 }
 
 /// The layers of one part.
-fn layers(part: usize, header: &Header, found: &mut Vec<Layer>) -> Result<()> {
+fn layers(part: usize, header: &Header, data: bool, found: &mut Vec<Layer>) -> Result<()> {
     let part_name = header.own_attributes.layer_name.as_ref().map(Text::to_string).unwrap_or_default();
     let mut prefixes: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
     for (index, channel) in header.channels.list.iter().enumerate() {
@@ -115,7 +120,7 @@ fn layers(part: usize, header: &Header, found: &mut Vec<Layer>) -> Result<()> {
         if header.channels.list.iter().any(|c| c.sampling != Vec2(1, 1)) {
             return Err(Error::unsupported("EXR images with subsampled channels are not read"));
         }
-        let choice = Choice { part, channels, alpha: get("A"), coloured };
+        let choice = Choice { part, channels, alpha: get("A"), coloured, data };
         let mut layer = Layer { part_name: part_name.clone(), prefix, choice, vector: false };
         layer.vector = VECTORS.contains(&layer.last().as_str());
         found.push(layer);

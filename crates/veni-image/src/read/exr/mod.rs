@@ -14,6 +14,7 @@ use exr::math::Vec2;
 use exr::meta::BlockDescription;
 use exr::meta::attribute::{AttributeValue, EnvironmentMap, Text};
 use exr::meta::header::Header;
+use half::f16;
 use rayon::prelude::*;
 
 use super::meaning::Meaning;
@@ -24,6 +25,8 @@ use crate::{Error, Result};
 use crate::{Panorama, Provenance, RADIANCE_SCALE};
 use veni_light::sphere::Equirect;
 
+/// What covers less of a pixel than this is not known from it.
+const LEAST_ALPHA: f32 = 1.0 / 64.0;
 /// What is said of several samples to a pixel.
 const DEEP: &str = "a deep EXR image; flatten it to one sample per pixel";
 
@@ -40,13 +43,21 @@ pub(super) fn read(file: impl Read + Seek, path: &Path, options: &ReadOptions) -
         if options.data { Meaning::linear() } else { tags::meaning(&header, &attributes, choice.coloured)? };
     let mut panorama = Panorama::new(grid, vec![[0.0; 3]; grid.len()]);
     let mut known = stored_window(&header, grid, choice.alpha.is_some());
-    pixels::read(reader, path, &choice, &header, &mut panorama.pixels, known.as_deref_mut(), grid)?;
+    let beyond =
+        pixels::read(reader, path, &choice, &header, &mut panorama.pixels, known.as_deref_mut(), grid)?;
     panorama.attributes = attributes;
     panorama.note_provenance();
     panorama.notes.clone_from(&meaning.notes);
+    if beyond > 0 {
+        panorama.notes.push(format!(
+            "{beyond} values are infinite, beyond what half precision holds: they are taken for its largest, {}, and what \
+             they had more is lost",
+            f16::MAX
+        ));
+    }
     panorama.known = known;
     if choice.alpha.is_some() {
-        cover(&mut panorama, options.data);
+        cover(&mut panorama, stored_window(&header, grid, false), options.data);
     }
     meaning.apply(&mut panorama.pixels);
     match panorama.attributes.get(RADIANCE_SCALE) {
@@ -87,9 +98,9 @@ fn stored_window(header: &Header, grid: Equirect, alpha: bool) -> Option<Vec<f32
     Some(known)
 }
 
-/// Colours are stored times alpha (OpenEXR, "Interpreting OpenEXR files"): divides by it. An alpha that is 0 everywhere says
-/// nothing if there are colours.
-fn cover(panorama: &mut Panorama, data: bool) {
+/// Colours are stored times alpha (OpenEXR, "Interpreting OpenEXR files"): divides by it, and what is then a colour is known. An
+/// alpha that is 0 everywhere says nothing if there are colours; what the file holds is then its `window`.
+fn cover(panorama: &mut Panorama, window: Option<Vec<f32>>, data: bool) {
     let Some(alpha) = &panorama.known else { return };
     if alpha.iter().all(|a| *a >= 1.0) {
         panorama.known = None;
@@ -100,19 +111,34 @@ fn cover(panorama: &mut Panorama, data: bool) {
         panorama
             .notes
             .push("its alpha channel is 0 everywhere although there are colours: it is ignored".to_owned());
-        panorama.known = None;
+        panorama.known = window;
         return;
     }
     let Some(alpha) = &mut panorama.known else { return };
-    panorama.pixels.par_iter_mut().zip(alpha).for_each(|(pixel, alpha)| {
-        // NaN is nothing known
-        *alpha = if *alpha > 0.0 { alpha.min(1.0) } else { 0.0 };
-        if *alpha == 0.0 {
-            *pixel = [0.0; 3];
-        } else if !data {
-            *pixel = pixel.map(|v| v / *alpha);
+    let hidden =
+        |(pixel, alpha): &(&[f32; 3], &f32)| (0.0..LEAST_ALPHA).contains(*alpha) && **pixel != [0.0; 3];
+    let coloured = panorama.pixels.iter().zip(&*alpha).filter(hidden).count();
+    if coloured > 0 {
+        panorama.notes.push(format!(
+            "{:.1} % of its pixels have a colour although their alpha is 0 or below {LEAST_ALPHA}: they count as \
+             transparent; where they are light, store them without alpha",
+            100.0 * coloured as f64 / alpha.len() as f64
+        ));
+    }
+    panorama.pixels.par_iter_mut().zip(&mut *alpha).for_each(|(pixel, alpha)| {
+        // NaN is nothing known; of too little, division would make a light that nobody saw
+        if *alpha >= LEAST_ALPHA {
+            if !data {
+                *pixel = pixel.map(|v| v / alpha.min(1.0));
+            }
+            *alpha = 1.0;
+        } else {
+            (*pixel, *alpha) = ([0.0; 3], 0.0);
         }
     });
+    if alpha.iter().all(|known| *known == 1.0) {
+        panorama.known = None;
+    }
 }
 
 pub(super) fn attributes(file: impl Read + Seek, path: &Path) -> Result<BTreeMap<String, String>> {

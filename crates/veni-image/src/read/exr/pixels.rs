@@ -23,7 +23,8 @@ use veni_light::sphere::Equirect;
 const BATCH: usize = 32;
 const BATCH_BYTES: usize = 1 << 28;
 
-/// Decompresses all blocks of the largest level and copies them to where the display window has them.
+/// Decompresses all blocks of the largest level and copies them to where the display window has them. Returns how many colour
+/// values of half precision were +∞.
 pub(super) fn read(
     reader: Reader<impl Read + Seek>,
     path: &Path,
@@ -32,7 +33,7 @@ pub(super) fn read(
     out: &mut [[f32; 3]],
     mut known: Option<&mut [f32]>,
     grid: Equirect,
-) -> Result<()> {
+) -> Result<usize> {
     let part = choice.part;
     let mut chunks = reader
         .filter_chunks(false, |_, tile, block| block.layer == part && tile.is_largest_resolution_level())
@@ -45,6 +46,7 @@ pub(super) fn read(
         i64::from(header.own_attributes.layer_position.1) - i64::from(origin.1),
     ];
     let mut seen = HashSet::with_capacity(expected);
+    let mut beyond = 0;
     let together = (BATCH_BYTES / header.max_block_byte_size().max(1)).clamp(1, BATCH);
     loop {
         let batch =
@@ -61,7 +63,8 @@ pub(super) fn read(
             })
             .collect::<Result<Vec<_>, exr::error::Error>>()
             .map_err(|e| wrap(e, path))?;
-        for (index, (pixels, alpha)) in decoded {
+        for (index, Rows { pixels, alpha, beyond: here }) in decoded {
+            beyond += here;
             if index.layer != part || index.level != Vec2(0, 0) || !seen.insert(index.pixel_position) {
                 return Err(Error::invalid(
                     "damaged EXR file: a block is stored twice or in the wrong place",
@@ -76,17 +79,24 @@ pub(super) fn read(
     if seen.len() != expected {
         return Err(Error::invalid(format!("truncated EXR file: {} of {expected} blocks", seen.len())));
     }
-    Ok(())
+    Ok(beyond)
 }
 
-/// The pixels of a block, and their alpha where it is wanted.
-type Rows = (Vec<[f32; 3]>, Option<Vec<f32>>);
+/// One block, row-major.
+struct Rows {
+    pixels: Vec<[f32; 3]>,
+    /// Where it is wanted.
+    alpha: Option<Vec<f32>>,
+    /// Colour values that were +∞ in half precision.
+    beyond: usize,
+}
 
 /// The pixels of one block, row-major.
 fn rows(block: &UncompressedBlock, choice: &Choice, header: &Header) -> exr::error::Result<Rows> {
     let Vec2(width, height) = block.index.pixel_size;
     let mut pixels = vec![[0f32; 3]; width * height];
     let mut alpha = choice.alpha.map(|_| vec![0f32; width * height]);
+    let mut beyond = 0;
     let (mut halves, mut line) = (vec![f16::ZERO; width], vec![0f32; width]);
     for slice in block.lines(&header.channels) {
         let wanted = (0..3).filter(|&i| choice.channels[i] == slice.location.channel).collect::<Vec<_>>();
@@ -98,6 +108,9 @@ fn rows(block: &UncompressedBlock, choice: &Choice, header: &Header) -> exr::err
             SampleType::F16 => {
                 slice.read_samples_into_slice(&mut halves)?;
                 halves.convert_to_f32_slice(&mut line);
+                if !is_alpha && !choice.data {
+                    beyond += largest_for_infinite(&mut line);
+                }
             }
             SampleType::F32 => slice.read_samples_into_slice(&mut line)?,
             SampleType::U32 => {
@@ -116,7 +129,17 @@ fn rows(block: &UncompressedBlock, choice: &Choice, header: &Header) -> exr::err
             }
         }
     }
-    Ok((pixels, alpha))
+    Ok(Rows { pixels, alpha, beyond })
+}
+
+/// A light too bright for half precision was written as +∞; it has at least the largest value. Returns how many there were.
+fn largest_for_infinite(line: &mut [f32]) -> usize {
+    let mut beyond = 0;
+    for value in line.iter_mut().filter(|value| **value == f32::INFINITY) {
+        *value = f16::MAX.to_f32();
+        beyond += 1;
+    }
+    beyond
 }
 
 /// Copies a block's rows, cut to the display window.

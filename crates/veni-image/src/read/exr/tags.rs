@@ -18,6 +18,11 @@ pub(super) fn meaning(header: &Header, text: &BTreeMap<String, String>, coloured
         .shared_attributes
         .chromaticities
         .map(|c| Primaries([c.red, c.green, c.blue, c.white].map(|v| [f64::from(v.0), f64::from(v.1)])));
+    let unsaid = Primaries([[0.0; 2]; 4]);
+    if chromaticities == Some(unsaid) {
+        meaning.note("chromaticities are all 0, which is no colour space: they are ignored");
+    }
+    let chromaticities = chromaticities.filter(|stated| *stated != unsaid);
     let mut primaries = chromaticities;
     if let Some(id) = text.get("colorInteropID").map(|id| id.trim()).filter(|id| !id.is_empty()) {
         match interop(id) {
@@ -53,6 +58,9 @@ pub(super) fn meaning(header: &Header, text: &BTreeMap<String, String>, coloured
     for (name, value) in others {
         if name.as_slice() == b"acesImageContainerFlag" && *value == AttributeValue::I32(1) {
             primaries = primaries.or(Some(AP0));
+        }
+        if let (b"Orientation", AttributeValue::I32(at @ 2..=8)) = (name.as_slice(), value) {
+            meaning.note(format!("Orientation = {at} is not applied: pixels are taken as they are stored"));
         }
     }
     if let Some(primaries) = primaries.filter(|_| coloured) {
