@@ -56,10 +56,17 @@ impl Item {
     ///
     /// # Errors
     /// As [`Item::split`]; also for options that no light satisfies.
-    pub fn split_by(path: &Path, panorama: Panorama, grid: Equirect, options: LightOptions) -> Result<Self> {
+    pub fn split_by(
+        path: &Path,
+        mut panorama: Panorama,
+        grid: Equirect,
+        options: LightOptions,
+    ) -> Result<Self> {
         if options.lights == 0 {
             return Ok(Self::new(path, &panorama, grid));
         }
+        // of the whole: without its lamps a panorama of lamps on black has no mean to be dark by
+        panorama.replace_zeros();
         let full = panorama.grid();
         let light = options.of_pixels(full, panorama.into_pixels())?;
         let lights = light.lights().clone();

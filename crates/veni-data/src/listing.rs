@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
+use veni_image::{Budget, Content, ReadOptions};
 use veni_light::progress::Observer;
 
 /// Extensions of images with a display's range, which somebody may take for panoramas.
@@ -12,7 +13,8 @@ const LOW_RANGE: [&str; 12] =
 /// Most of them that are named.
 const MOST_NAMED: usize = 5;
 
-/// The `.exr` and `.hdr` files directly inside `folder`, sorted by name; a file stands for itself. What looks like a panorama
+/// The `.exr` and `.hdr` files directly inside `folder`, and pictures of other formats that hold high dynamic range (PQ, HLG, gain
+/// maps), sorted by name; a file stands for itself. What looks like a panorama
 /// and is none to this program (a link to nowhere, an image with a display's range) is left out and reported to `observer`.
 ///
 /// # Errors
@@ -49,7 +51,7 @@ pub fn panorama_files(folder: &Path, observer: &dyn Observer) -> Result<Vec<Path
                 }
             }
         } else if LOW_RANGE.iter().any(|low| extension == *low) {
-            low_range.push(path);
+            if holds_radiance(&path) { files.push(path) } else { low_range.push(path) }
         }
     }
     files.sort();
@@ -65,6 +67,13 @@ pub fn panorama_files(folder: &Path, observer: &dyn Observer) -> Result<Vec<Path
         ));
     }
     Ok(files)
+}
+
+/// Whether a picture is of high dynamic range all the same: PQ, HLG, a gain map. Few files ask for it, so they are read twice.
+fn holds_radiance(path: &Path) -> bool {
+    let options = ReadOptions::default();
+    let _claim = Budget::shared().claim_file(path, &options);
+    matches!(Content::read(path, &options), Ok(Content::Radiance(_)))
 }
 
 fn unreadable(path: &Path, error: &std::io::Error) -> String {

@@ -1,16 +1,23 @@
 //! From a picture to what can be fitted: log radiance at exposure 0, what is known, what is clipped.
 
+pub(crate) mod black;
+
 use std::f32::consts::TAU;
 
 use crate::FitTarget;
 use crate::{Error, Result};
-use veni_image::{Panorama, Picture, exposure, luminance};
+use veni_image::{Panorama, Picture, exposure, luminance, without_zeros};
 use veni_light::sphere::{Equirect, View};
 
 /// A cell counts as unknown if less of it is known.
 const LEAST_KNOWN: f32 = 0.1;
 
 /// One image, ready to be fitted.
+///
+/// Black is dark, not unknown: a known value of 0, or below, stands for the smallest positive one of the picture, and at most 10⁻⁴ of
+/// its mean radiance; in a pixel of which other channels have light, for a hundredth of its luminance ([`without_zeros`]). In a
+/// photograph of display values it stands for the smallest that a pixel has, and at most the first step of 8
+/// bits: what was clipped to black is known to be no brighter.
 #[derive(Clone, Debug)]
 pub struct Observation {
     grid: Equirect,
@@ -54,7 +61,8 @@ impl Observation {
             .flat_map(|j| std::iter::repeat_n(grid.solid_angle(j) as f32, grid.width))
             .collect();
         let known = known.pixels().iter().map(|k| k[0]).collect();
-        Self::new(grid, None, &areas, sums.pixels(), known, clips.as_ref().map(Panorama::pixels))
+        let (sums, clips) = (sums.pixels(), clips.as_ref().map(Panorama::pixels));
+        Self::new(grid, None, &areas, sums, known, black::of_display(picture), clips)
     }
 
     /// A photograph taken by `view`, averaged over square cells so that neither side is longer than `longest`
@@ -97,35 +105,37 @@ impl Observation {
         let view = View { fov: seen, ..*view };
         let (directions, areas) = view.pixels(w, h);
         let perspective = Perspective { view, directions, areas: areas.clone() };
-        Self::new(Equirect::new(w, h), Some(perspective), &areas, &sums, known, clips.as_deref())
+        let (grid, black) = (Equirect::new(w, h), black::of_display(picture));
+        Self::new(grid, Some(perspective), &areas, &sums, known, black, clips.as_deref())
     }
 
-    /// `sums` are radiance × known.
+    /// `sums` are radiance × known; `black` is what stands for 0, if the picture's own radiance does not say it.
     fn new(
         grid: Equirect,
         perspective: Option<Perspective>,
         areas: &[f32],
         sums: &[[f32; 3]],
         mut known: Vec<f32>,
+        black: Option<f32>,
         clips: Option<&[[f32; 3]]>,
     ) -> Result<Self> {
-        let mut radiance = Vec::with_capacity(3 * sums.len());
-        for (sum, known) in sums.iter().zip(&mut known) {
-            if *known < LEAST_KNOWN || sum.iter().all(|v| *v <= 0.0) {
-                *known = 0.0;
-            }
-            radiance.extend(sum.map(|v| if *known > 0.0 { v / *known } else { 1.0 }));
-        }
-        // a channel that is 0 has no logarithm: the darkest value that is known stands for it
-        let counted = radiance.iter().zip(known.iter().flat_map(|k| [*k; 3]));
-        let darkest = counted.filter(|(v, k)| *k > 0.0 && **v > 0.0).map(|(v, _)| *v).reduce(f32::min);
-        let darkest =
-            darkest.ok_or_else(|| Error::invalid("no known pixel of the picture has positive radiance"))?;
-        let mut log_radiance: Vec<f32> = radiance.iter().map(|v| v.max(darkest).ln()).collect();
-        let lit = |rgb: &[f32; 3]| f64::from(luminance(rgb.map(|v| v.max(darkest)))).ln();
-        let logs: Vec<f64> = radiance.as_chunks().0.iter().map(lit).collect();
+        known.iter_mut().filter(|k| **k < LEAST_KNOWN).for_each(|k| *k = 0.0);
+        let pairs = sums.iter().zip(&known);
+        let radiance: Vec<[f32; 3]> =
+            pairs.map(|(sum, k)| if *k > 0.0 { sum.map(|v| v / k) } else { [1.0; 3] }).collect();
         let weights: Vec<f64> =
             known.iter().zip(areas).map(|(known, area)| f64::from(known * area)).collect();
+        let of_radiance = black::of_radiance(&radiance, &weights)
+            .ok_or_else(|| Error::invalid("no known pixel of the picture has positive radiance"))?;
+        let radiance: Vec<[f32; 3]> = match black {
+            Some(black) => radiance.into_iter().map(|rgb| rgb.map(|v| v.max(black))).collect(),
+            None => {
+                let lit = |rgb: [f32; 3]| without_zeros(rgb.map(|v| v.max(0.0)), of_radiance);
+                radiance.into_iter().map(lit).collect()
+            }
+        };
+        let mut log_radiance: Vec<f32> = radiance.as_flattened().iter().map(|v| v.ln()).collect();
+        let logs: Vec<f64> = radiance.iter().map(|rgb| f64::from(luminance(*rgb)).ln()).collect();
         let log_exposure = exposure::over_pixels(&logs, &weights);
         log_radiance.iter_mut().for_each(|v| *v -= log_exposure);
         let clipped = clips.map(|clips| clips.as_flattened().iter().map(|c| *c > 0.0).collect::<Vec<_>>());

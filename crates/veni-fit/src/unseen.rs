@@ -4,11 +4,12 @@
 //! Compact lights in sight are taken out first ([`seen_lights`]). What is not seen has nothing but the prior to go by: its weight is larger, the exposure is found with the latent, and of several
 //! starts the best is kept. A sun out of sight is the one that the prior thinks most likely given the vectors, MODEL (74).
 
-use veni_image::Picture;
+use veni_image::{DARK_SHARE, Picture};
 use veni_light::latent::{Latent, Prior};
 use veni_light::light::{CompactLight, LightOptions, Lights, luminance};
 use veni_light::sphere::Equirect;
 
+use crate::observation::black;
 use crate::{Error, FitConfig, Observation, Plateau, Result, random_starts};
 
 /// Starts: enough to see where they disagree.
@@ -53,7 +54,8 @@ pub fn likely_sun(prior: &Prior, latent: &Latent, observation: &Observation) -> 
 
 /// Up to `most` compact lights of what is known of a panorama of radiance, none of an angular radius above `widest` (radians), and
 /// the panorama without them. A field that was trained
-/// without suns should not see them, and a sun in sight leaves none to be guessed.
+/// without suns should not see them, and a sun in sight leaves none to be guessed. Where all that is left is black, it is 10⁻⁴ of the
+/// mean radiance of the picture with its lights instead: dark beside them, and something to be fitted.
 ///
 /// # Errors
 /// [`Error::Invalid`] if the picture is not twice as wide as high, no pixel is known to have positive radiance, or `most` is more
@@ -73,14 +75,15 @@ pub fn seen_lights(picture: &Picture, most: usize, widest: f32) -> Result<(Pictu
     let known: Vec<f32> = (0..grid.len()).map(known).collect();
     // of a resampled panorama values may be a little below 0
     let mut pixels: Vec<_> = picture.pixels().iter().map(|p| p.map(|v| v.max(0.0))).collect();
+    let weights: Vec<f64> =
+        known.iter().enumerate().map(|(p, k)| grid.solid_angle(p / width) * f64::from(*k)).collect();
+    let mean = black::mean(&pixels, &weights);
     let partial = known.iter().any(|k| *k < 1.0);
     if partial {
         // what is not known is even and as bright as the rest in the mean: nothing stands out of it
-        let weighted =
-            pixels.iter().zip(&known).enumerate().filter(|(_, (p, k))| **k > 0.0 && luminance(**p) > 0.0);
+        let lit = pixels.iter().zip(&weights).filter(|(p, weight)| **weight > 0.0 && luminance(**p) > 0.0);
         let (mut sum, mut whole) = (0.0, 0.0);
-        for (p, (pixel, k)) in weighted {
-            let weight = grid.solid_angle(p / width) * f64::from(*k);
+        for (pixel, weight) in lit {
             (sum, whole) = (sum + weight * f64::from(luminance(*pixel)).ln(), whole + weight);
         }
         if whole == 0.0 {
@@ -93,7 +96,12 @@ pub fn seen_lights(picture: &Picture, most: usize, widest: f32) -> Result<(Pictu
     }
     let light = LightOptions { lights: most, widest, ..LightOptions::default() }.of_pixels(grid, pixels)?;
     let lights = light.lights().clone();
-    let rest = Picture::new([width, height], light.into_residual())?;
+    let mut rest = light.into_residual();
+    let is_lit = |(pixel, known): (&[f32; 3], &f32)| *known > 0.0 && pixel.iter().any(|v| *v > 0.0);
+    if !lights.is_empty() && !rest.iter().zip(&known).any(is_lit) {
+        rest.fill([(DARK_SHARE * mean) as f32; 3]);
+    }
+    let rest = Picture::new([width, height], rest)?;
     Ok((if partial { rest.masked(&known)? } else { rest }, lights))
 }
 

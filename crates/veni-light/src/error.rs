@@ -24,12 +24,14 @@ pub enum Error {
         message: String,
     },
     /// An image whose format holds a display's range, where radiance is needed.
-    #[error("{}: {format} holds no high dynamic range; expand such panoramas into EXR files first", path.display())]
+    #[error("{}: {format} holds no high dynamic range{}; expand such panoramas into EXR files first", path.display(), in_brackets(notes))]
     LowRange {
         /// The image.
         path: PathBuf,
         /// Its format ("PNG").
         format: &'static str,
+        /// What it says that is not applied: there may be high dynamic range in it after all.
+        notes: Vec<String>,
     },
     /// A file with several layers, of which one must be named, or without the one that was.
     #[error("{}: {}", path.display(), layers_message(wanted.as_deref(), layers))]
@@ -164,6 +166,10 @@ impl Error {
 /// A path as it stands before a message.
 fn before(path: Option<&Path>) -> String {
     path.map(|path| format!("{}: ", path.display())).unwrap_or_default()
+}
+
+fn in_brackets(notes: &[String]) -> String {
+    if notes.is_empty() { String::new() } else { format!(" ({})", notes.join("; ")) }
 }
 
 fn layers_message(wanted: Option<&str>, layers: &[String]) -> String {

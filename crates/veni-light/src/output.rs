@@ -1,7 +1,9 @@
 //! Writing files so that nothing is ever lost: beside the target, synced, then given its name in one step.
 
 mod below;
+mod left;
 mod lock;
+mod own_folder;
 mod part;
 
 use std::fs::{self, File, OpenOptions};
@@ -12,8 +14,10 @@ use crate::{Error, Result};
 use part::Part;
 
 pub use below::below;
+pub use left::{remove_folder_if_left, remove_if_left};
 pub use lock::Lock;
-pub use part::{Abandoned, abandon, forget, is_part, process_token, remember, remove_if_left};
+pub use own_folder::OwnFolder;
+pub use part::{Abandoned, abandon, forget, is_part, part_beside, process_token, remember};
 
 /// Whether an existing file may be replaced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use crate::{Error, Result};
 
 /// The text of a file's bytes, without its byte order mark: UTF-8, or UTF-16 if it begins with a mark that says so, as
-/// Windows PowerShell writes it.
+/// Windows PowerShell writes it; with the [`line_ends`] that readers know.
 ///
 /// # Errors
 /// [`Error::Invalid`] if it is not that.
@@ -19,6 +19,13 @@ pub fn decode(bytes: Vec<u8>) -> Result<String> {
         [0xef, 0xbb, 0xbf, rest @ ..] => utf8(rest.to_vec()),
         _ => utf8(bytes),
     }
+    .map(line_ends)
+}
+
+/// The same text with lines that end in LF, if they all end in CR alone, as those of old Macintosh programs do: to readers of lines
+/// it would be a single one.
+pub fn line_ends(text: String) -> String {
+    if text.contains('\r') && !text.contains('\n') { text.replace('\r', "\n") } else { text }
 }
 
 /// Whether text begins with a JSON object, as far as its first bytes say; they may end anywhere.
@@ -55,6 +62,8 @@ mod tests {
             assert!(begins_object(&bytes[..8]), "{bytes:?}");
             assert_eq!(decode(bytes).unwrap(), text);
         }
+        let lines = |text: &str| decode(text.as_bytes().to_vec()).unwrap();
+        assert_eq!((lines("a\rb\r"), lines("a\r\nb")), ("a\nb\n".into(), "a\r\nb".into()));
         assert!(begins_object(b"\xef\xbb\xbf \n {") && !begins_object(b"[1]") && !begins_object(b""));
         for wrong in [&b"\xff\xfe\x00\xd8"[..], b"\xff\xfe\x41", b"\x80"] {
             assert!(decode(wrong.to_vec()).is_err(), "{wrong:?}");

@@ -143,7 +143,7 @@ impl LossView {
     fn new(kind: LossGrid, grid: Equirect, rng: &mut Stream) -> Self {
         let offset = match kind {
             LossGrid::Strided { factor } => [rng.below(factor), rng.below(factor)],
-            LossGrid::Full | LossGrid::Averaged { .. } => [0; 2],
+            LossGrid::Full {} | LossGrid::Averaged { .. } => [0; 2],
         };
         Self { grid, kind, offset }
     }
@@ -155,7 +155,7 @@ impl LossView {
     fn directions(&self) -> Vec<f32> {
         let [rows, columns] = self.size();
         match self.kind {
-            LossGrid::Full | LossGrid::Averaged { .. } => {
+            LossGrid::Full {} | LossGrid::Averaged { .. } => {
                 Equirect::new(columns, rows).directions().into_iter().flatten().collect()
             }
             LossGrid::Strided { factor } => (0..rows)
@@ -170,7 +170,7 @@ impl LossView {
     fn extend_target(&self, image: &[f32], target: &mut Vec<f32>) {
         let ([rows, columns], width) = (self.size(), self.grid.width);
         match self.kind {
-            LossGrid::Full => target.extend_from_slice(image),
+            LossGrid::Full {} => target.extend_from_slice(image),
             LossGrid::Strided { factor } => {
                 for j in (0..rows).map(|j| self.offset[0] + j * factor) {
                     for i in (0..columns).map(|i| self.offset[1] + i * factor) {

@@ -54,7 +54,7 @@ pub struct Expansion {
 /// A panorama that is fit for training.
 #[derive(Clone, Debug)]
 pub struct Examined {
-    /// Positive and finite radiance at the size asked for.
+    /// Finite radiance at the size asked for, nowhere negative.
     pub panorama: Panorama,
     /// The size of the file.
     pub size: Equirect,
@@ -104,7 +104,7 @@ pub fn examine(path: &Path, config: &PrepareConfig) -> Result<Examined> {
             replaced,
             stops,
             expanded,
-            notes: panorama.notes().to_vec(),
+            notes: [panorama.notes(), &replaced.notes()].concat(),
         })
     };
     examined().map_err(|e| e.in_file(path))

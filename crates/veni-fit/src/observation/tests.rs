@@ -87,3 +87,65 @@ fn what_cannot_be_seen_is_refused() {
     let wide = Observation::photograph(&whole(&pixels, [4, 2]), &view, 64).unwrap_err().to_string();
     assert!(wide.contains("180"), "{wide}");
 }
+
+/// Radiance as it is fitted.
+fn values(seen: &Observation) -> Vec<f32> {
+    seen.log_radiance.iter().map(|v| (v + seen.log_exposure).exp()).collect()
+}
+
+#[test]
+fn black_is_known_to_be_dark() {
+    let (size, grid) = ([16, 8], Equirect::new(16, 8));
+    // a lamp of 10 over an eighth of the pixels, black elsewhere, and below black
+    let mut pixels = vec![[0.0f32, -3.0, 0.0]; 128];
+    (0..128).filter(|p| p % 16 < 2).for_each(|p| pixels[p] = [10.0; 3]);
+    let seen = Observation::panorama(&whole(&pixels, size), grid).unwrap();
+    assert!(seen.mask.is_none() && (seen.share() - 1.0).abs() < 1e-5, "all of it is known");
+    // 10⁻⁴ of the mean of 10/8
+    for (p, found) in values(&seen).iter().enumerate() {
+        let expected = if p / 3 % 16 < 2 { 10.0 } else { 1.25e-4 };
+        assert!((found / expected - 1.0).abs() < 1e-4, "{p}: {found} {expected}");
+    }
+    // what is unknown has no say in that
+    let mask: Vec<f32> = (0..128).map(|p| f32::from(u8::from(p % 16 < 8))).collect();
+    let half = Observation::panorama(&whole(&pixels, size).masked(&mask).unwrap(), grid).unwrap();
+    assert!((values(&half)[3 * 5] / 2.5e-4 - 1.0).abs() < 1e-4, "{}", values(&half)[3 * 5]);
+    // a darker value of the picture's own is the darkest
+    pixels[5] = [1e-5; 3];
+    let seen = Observation::panorama(&whole(&pixels, size), grid).unwrap();
+    assert!((values(&seen)[3 * 9] / 1e-5 - 1.0).abs() < 1e-4, "{}", values(&seen)[3 * 9]);
+    // in any unit of radiance that has logarithms
+    for pixel in &mut pixels {
+        *pixel = pixel.map(|v| v * 1e-32);
+    }
+    assert!(Observation::panorama(&whole(&pixels, size), grid).unwrap().log_exposure.is_finite());
+}
+
+#[test]
+fn the_black_of_a_photograph_is_the_first_step_of_its_values_at_most() {
+    let view = View { fov: 1.0, azimuth: 0.0, elevation: 0.0, roll: 0.0 };
+    let first = 1.0 / (255.0 * 12.92f32);
+    let darkest = |grey: f32| {
+        // half of it black, but for single pixels of one step, which are noise
+        let mut pixels = vec![[grey; 3]; 64];
+        pixels[..32].fill([0.0; 3]);
+        pixels[0] = [first; 3];
+        let seen = Observation::photograph(&whole(&pixels, [8, 8]).clipped_at(0.991), &view, 4).unwrap();
+        assert!(seen.mask.is_none(), "all of it is known");
+        values(&seen)
+    };
+    // bright or dark, and whether noise is mixed into a cell or not
+    for grey in [0.9, 0.01] {
+        let found = darkest(grey);
+        for v in [found[0], found[3]] {
+            assert!((v / first - 1.0).abs() < 0.02, "{v} for {first}");
+        }
+        assert!((found[3 * 15] / grey - 1.0).abs() < 1e-4);
+    }
+    // values of 16 bits are smaller than that step
+    let mut pixels = vec![[0.5; 3]; 64];
+    pixels[..32].fill([0.0; 3]);
+    pixels[32] = [1e-6; 3];
+    let seen = Observation::photograph(&whole(&pixels, [8, 8]).clipped_at(0.991), &view, 8).unwrap();
+    assert!((values(&seen)[0] / 1e-6 - 1.0).abs() < 1e-4, "{}", values(&seen)[0]);
+}

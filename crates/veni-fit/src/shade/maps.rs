@@ -8,6 +8,8 @@ use veni_image::{Content, Picture, ReadOptions};
 
 /// A normal counts if its length lies strictly between these (MODEL, Rendered images).
 const LENGTHS: [f64; 2] = [0.5, 1.5];
+/// A length that is 1 as far as half precision and the interpolation within a face tell.
+const UNIT: std::ops::RangeInclusive<f64> = 0.95..=1.05;
 
 /// An image of normals, row-major, row 0 on top; (0, 0, 0) where nothing is seen.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,9 +36,11 @@ impl NormalMap {
     /// nothing.
     ///
     /// # Errors
-    /// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is not such an image.
+    /// [`Error::Invalid`], [`Error::Unsupported`] or [`Error::Io`] if the file is not such an image; [`Error::Invalid`] also for an
+    /// EXR or Radiance file that looks coded 0 to 1 as a PNG is.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
+        let mut stands = false;
         let (grid, mut normals, known) = match Content::read(path, &data())? {
             Content::Display(image) => {
                 let decode =
@@ -46,12 +50,31 @@ impl NormalMap {
             }
             Content::Radiance(image) => {
                 let known = image.known().map(<[f32]>::to_vec);
+                stands = true;
                 (image.grid(), image.into_pixels(), known)
             }
         };
         let hidden = known.iter().flatten().zip(&mut normals).filter(|(known, _)| **known < 0.5);
         hidden.for_each(|(_, normal)| *normal = [0.0; 3]);
-        Self::new([grid.width, grid.height], normals).map_err(|e| e.in_file(path))
+        let map = Self::new([grid.width, grid.height], normals);
+        let refused = |map: &Self| if stands { map.refuse_coded() } else { Ok(()) };
+        map.and_then(|map| refused(&map).map(|()| map)).map_err(|e| e.in_file(path))
+    }
+
+    /// Coded as (n + 1)/2, nothing is negative, and only normals whose components add up to 0 have a length of 1. Of a surface of which
+    /// only sides towards +x, +y, +z are seen nothing is negative either, but all are of that length.
+    fn refuse_coded(&self) -> Result<()> {
+        let seen: Vec<_> = self.normals.iter().filter(|n| n.iter().any(|c| *c != 0.0)).collect();
+        let unit = seen.iter().filter(|n| UNIT.contains(&length(wide(***n)))).count();
+        let is_negative = seen.iter().any(|n| n.iter().any(|c| *c < 0.0));
+        if is_negative || 2 * unit >= seen.len() {
+            return Ok(());
+        }
+        Err(Error::invalid(format!(
+            "no component of its {} normals is negative, and only {unit} are of length 1: it looks coded 0 to 1; decode it by \
+             2v - 1",
+            seen.len()
+        )))
     }
 
     /// Columns and rows.
@@ -156,6 +179,33 @@ mod tests {
         let seen: Vec<_> = edge.normals().iter().map(|n| NormalMap::valid(*n).is_some()).collect();
         assert_eq!(seen, [false, false, true, true]);
         assert!(NormalMap::new([2, 2], vec![[0.0; 3]]).is_err());
+    }
+
+    #[test]
+    fn normals_coded_from_0_to_1_are_refused_where_they_are_not_decoded() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("n.exr");
+        let options = WriteOptions {
+            overwrite: Overwrite::Replace,
+            ..WriteOptions::new(WriteFormat::Exr(Precision::Half))
+        };
+        let read = |normals: &[[f32; 3]]| {
+            Panorama::new(Equirect::new(2, 2), normals.to_vec()).write(&path, &options).unwrap();
+            NormalMap::read(&path)
+        };
+        // one of the four is of length 1 by chance
+        let side = 0.5f32.sqrt();
+        let normals = [[0.6, 0.0, 0.8], [0.0, 0.0, 1.0], [0.0, -0.6, -0.8], [side, 0.0, -side]];
+        assert!(read(&normals).is_ok());
+        let coded = normals.map(|n| n.map(|c| 0.5 * c + 0.5));
+        let message = read(&coded).unwrap_err().to_string();
+        assert!(message.contains("n.exr: no component of its 4 normals"), "{message}");
+        assert!(message.contains("2v - 1"), "{message}");
+        // what is black shows nothing, and says nothing of the rest
+        assert!(read(&[coded[0], coded[1], [0.0; 3], [0.0; 3]]).is_err());
+        // one octant is all that is seen, or nothing
+        assert!(read(&[[0.0, 0.0, 1.0], [0.0; 3], [0.6, 0.8, 0.0], [1.0, 0.0, 0.0]]).is_ok());
+        assert!(read(&[[0.0; 3]; 4]).is_ok());
     }
 
     #[test]

@@ -96,3 +96,30 @@ fn starts_are_zero_and_draws_of_the_prior() {
     assert!(prior_weight(0.0) <= 1.0);
     config(0.1).check().unwrap();
 }
+
+#[test]
+fn black_between_lamps_is_dark_beside_them() {
+    let size = [128, 64];
+    let lamps = |rest: f32| {
+        let mut pixels = vec![[rest; 3]; SKY.len()];
+        for (x, y, radius) in [(20, 20, 3), (64, 40, 4), (100, 28, 2)] {
+            for (j, i) in (y - radius..y + radius).flat_map(|j| (x - radius..x + radius).map(move |i| (j, i)))
+            {
+                pixels[j * 128 + i] = [4.0, 7.0, 10.0];
+            }
+        }
+        pixels
+    };
+    let picture = Picture::new(size, lamps(0.0)).unwrap();
+    let weights: Vec<f64> = (0..SKY.len()).map(|p| SKY.solid_angle(p / 128)).collect();
+    let mean = black::mean(&lamps(0.0), &weights) as f32;
+    let (rest, lights) = seen_lights(&picture, 4, PI).unwrap();
+    assert_eq!(lights.len(), 3);
+    let seen = Observation::panorama(&rest, GRID).unwrap();
+    assert!((seen.log_exposure() - (1e-4 * mean).ln()).abs() < 1e-4, "{}", seen.log_exposure());
+    assert!(!seen.is_partial());
+    // without lights to be taken out, nothing is left to be seen
+    let (rest, lights) = seen_lights(&Picture::new(size, vec![[0.0; 3]; SKY.len()]).unwrap(), 4, PI).unwrap();
+    assert!(lights.is_empty());
+    assert!(Observation::panorama(&rest, GRID).unwrap_err().to_string().contains("no known pixel"));
+}

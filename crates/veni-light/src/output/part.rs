@@ -9,6 +9,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
+use super::left::{remove_folder_if_left, remove_if_left};
+use crate::{Error, Result};
+
 /// The unfinished files of this process.
 static LIVE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// The folders in which this process has looked for what others left.
@@ -118,18 +121,23 @@ fn sweep(folder: &Path) {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let Ok(entries) = fs::read_dir(folder) else { return };
     for path in entries.filter_map(|entry| entry.ok().map(|e| e.path())).filter(|p| is_part(p)) {
-        remove_if_left(&path);
+        if path.symlink_metadata().is_ok_and(|meta| meta.is_dir()) {
+            remove_folder_if_left(&path);
+        } else {
+            remove_if_left(&path);
+        }
     }
 }
 
-/// Removes an unfinished file unless its owner may be alive. Whether it is gone.
-pub fn remove_if_left(path: &Path) -> bool {
-    if !path.symlink_metadata().is_ok_and(|meta| meta.is_file()) {
-        return false;
-    }
-    let Ok(file) = OpenOptions::new().write(true).open(path) else { return false };
-    // the lock is held until the name is gone
-    file.try_lock().is_ok() && fs::remove_file(path).is_ok()
+/// The name of an unfinished file or folder beside `target`, which nothing has, after what others left there was removed.
+///
+/// # Errors
+/// [`Error::Invalid`] if `target` is not a name of something in a folder.
+pub fn part_beside(target: &Path) -> Result<PathBuf> {
+    let name =
+        target.file_name().ok_or_else(|| Error::invalid("is not a name to write to").in_file(target))?;
+    target.parent().into_iter().for_each(sweep);
+    Ok(target.with_file_name(hidden(name)))
 }
 
 /// A panic while the set was held came from a publication that is over.

@@ -15,6 +15,7 @@ impl TrainConfig {
         self.augment.check()?;
         self.check_bounds()?;
         self.check_system()?;
+        self.check_size()?;
         let factor = self.loss_grid.factor();
         let (w, h) = (self.data.width, self.data.height);
         if factor == 0 || !w.is_multiple_of(factor) || !h.is_multiple_of(factor) {
@@ -105,7 +106,7 @@ impl TrainConfig {
                 if !self.loss.irradiance.is_off() {
                     return foreign("loss.irradiance", "a set of rays, which an auto-decoder is trained on,");
                 }
-                if self.loss_grid != LossGrid::Full {
+                if !matches!(self.loss_grid, LossGrid::Full {}) {
                     return foreign(
                         "loss_grid",
                         "an auto-decoder, which is trained on rays (leave it full),",

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
 pub enum LossGrid {
     /// Every pixel of the panorama.
-    Full,
+    // with braces: without, keys that belong to another kind would be taken in silence
+    Full {},
     /// The panorama averaged over `factor` × `factor` pixels by solid angle, in log radiance.
     Averaged {
         /// Pixels per side of a cell; must divide width and height.
@@ -26,8 +27,27 @@ impl LossGrid {
     /// Pixels of the panorama per pixel of the loss grid, along each side.
     pub fn factor(self) -> usize {
         match self {
-            Self::Full => 1,
+            Self::Full {} => 1,
             Self::Averaged { factor } | Self::Strided { factor } => factor,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_of_no_kind_and_of_another_are_refused() {
+        let read = |text: &str| toml::from_str::<LossGrid>(text);
+        assert_eq!(read("kind = \"full\"").unwrap(), LossGrid::Full {});
+        assert_eq!(read("kind = \"strided\"\nfactor = 2").unwrap(), LossGrid::Strided { factor: 2 });
+        for text in [
+            "kind = \"full\"\nfoo = 1",
+            "kind = \"full\"\nfactor = 2",
+            "kind = \"strided\"\nfactor = 2\nx = 1",
+        ] {
+            assert!(read(text).unwrap_err().to_string().contains("unknown field"), "{text}");
         }
     }
 }

@@ -6,6 +6,7 @@ mod device;
 mod loss_grid;
 mod overrides;
 mod report;
+mod size;
 mod stage;
 #[cfg(test)]
 mod tests;

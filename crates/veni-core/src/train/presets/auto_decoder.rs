@@ -44,7 +44,7 @@ pub(super) fn preset(size: Preset, latent_vectors: usize) -> TrainConfig {
         ema_decay: 0.0,
         model: ModelConfig { kind: ModelKind::Reni, lights: 0, encoder: None, ..veni.model },
         augment: AugmentConfig::default(),
-        loss_grid: LossGrid::Full,
+        loss_grid: LossGrid::Full {},
         loss: LossConfig { mage: off, kld: WeightSchedule::Constant(1e-6), ..LossConfig::reference() },
         decoder: group(),
         encoder: None,

@@ -121,7 +121,7 @@ pub(super) fn tiny(latent_vectors: usize) -> TrainConfig {
             }),
         },
         data: DataConfig { width: 32, height: 16, ..DataConfig::default() },
-        loss_grid: LossGrid::Full,
+        loss_grid: LossGrid::Full {},
         decoder: group(3e-3, [10, steps], 0.05, AdamConfig::default()),
         encoder: Some(group(3e-3, [10, steps], 0.05, AdamConfig::default())),
         report: ReportConfig {
@@ -154,7 +154,7 @@ pub(super) fn paper(latent_vectors: usize) -> TrainConfig {
             encoder: Some(EncoderConfig::default()),
         },
         augment: AugmentConfig { mirror: 0.5, ..AugmentConfig::default() },
-        loss_grid: LossGrid::Full,
+        loss_grid: LossGrid::Full {},
         loss: LossConfig::default(),
         decoder: group(1e-4, [200, steps], 0.05, AdamConfig::default()),
         encoder: Some(group(1e-3, [200, steps], 0.05, AdamConfig::default())),
