@@ -34,10 +34,11 @@ def write(cli, folder):
     def veni(*args):
         subprocess.run([cli, *args, "--quiet"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
-    for model in ["27", "147", "300"]:
+    # all vectors and no lobes: the longest headers
+    for model in ["27", "vectors-147", "vectors-300"]:
         for size in ["64", "512"]:
             base = ["bake", "--seed", "7", "--model", model, "--size", size, "--device", "cpu"]
-            name = f"bake-{model}-{size}"
+            name = f"bake-{model.removeprefix('vectors-')}-{size}"
             veni(*base, "--half", "-o", f"{name}-half.exr")
             veni(*base, "--float", "-o", f"{name}-float.exr", "-o", f"{name}.hdr")
     veni("bake", "--seed", "7", "--layout", "cubemap", "--size", "16", "-o", "cube.exr", "-o", "cube.hdr")
@@ -55,7 +56,11 @@ def rules(path, said):
     """What other software's limits ask of a header."""
     if path.suffix == ".hdr":
         return [f"a line of {len(line)} bytes" for line in said if len(line.encode()) > 100]
-    return [f"{name} has {len(text)} bytes" for name, text in said.items() if len(text.encode()) > 255]
+    broken = [f"{name} has {len(text)} bytes" for name, text in said.items() if len(text.encode()) > 255]
+    parts = sum(name.startswith("veni:latent[") for name in said)
+    if path.name.startswith("bake-300") and parts < 15:
+        broken.append(f"its latent is in {parts} parts: not the long header that this check is about")
+    return broken
 
 
 def difference(path, image, truth):

@@ -253,8 +253,8 @@ fn what_is_replaced_is_said() {
         run.err
     };
     for (name, bad, encoded, fitted) in [
-        ("ringing.exr", -0.25, "1 negative values were replaced", "1 negative values count as black"),
-        ("hole.exr", f32::NAN, "1 values that are not a number", "1 pixels are not numbers"),
+        ("ringing.exr", -0.25, "1 values are negative: they count as 0", "1 negative values count as black"),
+        ("hole.exr", f32::NAN, "1 values are not a number", "1 pixels are not numbers"),
         ("dark.exr", 0.0, "", ""),
     ] {
         write(name, bad);

@@ -41,7 +41,20 @@ fn a_photograph_stands_upright_as_its_exif_data_says() {
     let dir = Dir::new();
     // so heavy a prior that there is one minimum: the pictures differ by what JPEG made of each orientation
     let fit = |name: &str, look: &str| {
-        let how = ["--fov", "65", "--look", look, "--starts", "1", "--steps", "60", "--prior", "1"];
+        let how = [
+            "--fov",
+            "65",
+            "--look",
+            look,
+            "--starts",
+            "1",
+            "--steps",
+            "60",
+            "--prior",
+            "1",
+            "--resolution",
+            "64",
+        ];
         latent(&one(&dir, &[&["fit", &file(name)][..], &how].concat()))
     };
     let upright = fit("photo_upright.jpg", "30,10,0");

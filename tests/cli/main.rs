@@ -10,6 +10,8 @@ mod bad_input;
 #[cfg(feature = "learn")]
 mod bake;
 #[cfg(feature = "pretrained")]
+mod cases;
+#[cfg(feature = "pretrained")]
 mod codes;
 #[cfg(feature = "learn")]
 mod crashes;
@@ -34,11 +36,15 @@ mod gpu;
 mod ibl;
 #[cfg(feature = "learn")]
 mod inspect;
+#[cfg(feature = "pretrained")]
+mod known;
 #[cfg(feature = "learn")]
 mod large_sets;
 #[cfg(feature = "pretrained")]
 mod light;
 mod limits;
+#[cfg(feature = "pretrained")]
+mod named;
 #[cfg(feature = "onnx")]
 #[path = "../../crates/veni-data/src/expand/network/onnx_file.rs"]
 #[allow(dead_code, reason = "veni-data's tests use the rest of it")]

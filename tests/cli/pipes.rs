@@ -206,14 +206,8 @@ fn every_input_comes_through_a_pipe() {
         (ball.clone(), "normals.exr"),
         (ball, "mask.png"),
         (albedo, "normals.exr"),
-        (
-            vec!["fit", "--target-sh", "light.json", "--steps", "2", "-q", "-o", "out.json", "-f"],
-            "light.json",
-        ),
-        (
-            vec!["fit", "--target-irradiance", "light.json", "--steps", "2", "-q", "-o", "out.json", "-f"],
-            "light.json",
-        ),
+        ([&["fit", "--target-sh", "light.json"], &fit[..]].concat(), "light.json"),
+        ([&["fit", "--target-irradiance", "light.json"], &fit[..]].concat(), "light.json"),
         (
             vec![
                 "render-probe",

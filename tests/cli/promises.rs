@@ -31,7 +31,7 @@ fn begun(dir: &Dir, count: usize) {
 #[test]
 fn what_comes_into_being_meanwhile_is_not_replaced() {
     let dir = Dir::new();
-    let child = slow(&dir, &["-o", "late.exr", "--size", "2048"]);
+    let child = slow(&dir, &["-o", "late.exr", "--size", "1024"]);
     begun(&dir, 1);
     dir.write("late.exr", "precious");
     let ended = child.wait_with_output().unwrap();
@@ -45,7 +45,7 @@ fn what_comes_into_being_meanwhile_is_not_replaced() {
 #[test]
 fn of_two_bakes_to_one_name_one_wins() {
     let dir = Dir::new();
-    let small = ["-o", "one.exr", "-o", "one.png", "--size", "1024"];
+    let small = ["-o", "one.exr", "-o", "one.png", "--size", "512"];
     let children: Vec<_> = (0..2).map(|_| slow(&dir, &small)).collect();
     let ended: Vec<_> = children.into_iter().map(|child| child.wait_with_output().unwrap()).collect();
     let mut codes: Vec<_> = ended.iter().map(|e| e.status.code().unwrap()).collect();
@@ -53,6 +53,62 @@ fn of_two_bakes_to_one_name_one_wins() {
     assert_eq!(codes, [0, 2], "{ended:?}");
     assert_eq!(dir.files().len(), 2, "{:?}", dir.files());
     dir.ok(&["inspect", "one.exr"]);
+}
+
+/// A folder for an engine, of a sky that takes a while.
+fn ibl(dir: &Dir, name: &str) -> Child {
+    let args = ["ibl", "sky.exr", "--engine", "three", "--size", "256", "-q", "-o", name];
+    dir.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// The unfinished folders beside the files.
+fn part_folders(dir: &Dir) -> usize {
+    let names = std::fs::read_dir(dir.path("")).unwrap().map(|entry| entry.unwrap().file_name());
+    names.filter(|name| name.to_string_lossy().ends_with(".part")).count()
+}
+
+fn folder_begun(dir: &Dir) {
+    let patience = Instant::now();
+    while part_folders(dir) == 0 {
+        assert!(patience.elapsed() < Duration::from_secs(60), "no folder was begun");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn folders_keep_the_promises_of_files() {
+    let dir = Dir::new();
+    dir.ok(&["bake", "--seed", "5", "--size", "64", "--device", "cpu", "-q", "-o", "sky.exr"]);
+    // what comes into being meanwhile stays
+    let child = ibl(&dir, "late");
+    folder_begun(&dir);
+    std::fs::create_dir(dir.path("late")).unwrap();
+    dir.write("late/sky.ktx2", "precious");
+    let ended = child.wait_with_output().unwrap();
+    let err = String::from_utf8(ended.stderr).unwrap();
+    assert!(ended.status.code() == Some(2) && err.contains("late: exists already"), "{err}");
+    assert_eq!(std::fs::read_to_string(dir.path("late/sky.ktx2")).unwrap(), "precious");
+    // of two to one name one wins
+    let children = [ibl(&dir, "one"), ibl(&dir, "one")];
+    let mut codes = children.map(|child| child.wait_with_output().unwrap().status.code().unwrap());
+    codes.sort_unstable();
+    assert_eq!((codes, part_folders(&dir)), ([0, 2], 0));
+    // killed outright, it cannot clean up: the next one does, be it another command
+    let mut child = ibl(&dir, "killed");
+    folder_begun(&dir);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(part_folders(&dir), 1);
+    dir.ok(&["bake", "--seed", "2", "--size", "16", "-q", "-o", "small.exr"]);
+    assert_eq!(part_folders(&dir), 0);
+    #[cfg(unix)]
+    {
+        let mut child = ibl(&dir, "ended");
+        folder_begun(&dir);
+        signal(&child, "-TERM");
+        child.wait().unwrap();
+        assert!(part_folders(&dir) == 0 && !dir.path("ended").exists());
+    }
 }
 
 #[cfg(unix)]

@@ -1,5 +1,6 @@
 //! A run's folder belongs to one process, its settings have bounds, and what is in it leads nowhere else.
 
+use std::io::Read;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -202,6 +203,20 @@ fn a_request_to_terminate_is_answered_while_data_is_read_and_while_it_trains() {
     let sent = terminate(&child);
     assert_eq!(child.wait().unwrap().code(), Some(1));
     assert!(sent.elapsed() < Duration::from_secs(5), "{:?}", sent.elapsed());
+    // a step of minutes is not waited for
+    let slow =
+        [&train_args(&data, "slow", "1")[..], &["--set", "model.latent_vectors=4096", "--set", "batch=512"]]
+            .concat();
+    let mut child = dir.command(&slow).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for("a run folder", || dir.path("slow/config.toml").exists());
+    std::thread::sleep(Duration::from_secs(2));
+    let sent = terminate(&child);
+    let status = child.wait().unwrap();
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert!(sent.elapsed() < Duration::from_secs(15), "{:?}", sent.elapsed());
+    let signal = std::os::unix::process::ExitStatusExt::signal(&status);
+    assert!(signal == Some(15) && said.contains("no step ended within 8 s"), "{status:?}: {said}");
 }
 
 /// One bad entry never ends the whole, and is named.

@@ -18,6 +18,9 @@ use crate::progress::ProgressBars;
 use crate::report::Report;
 use crate::size::Size;
 
+/// The largest radiance that is written: what a Radiance file holds, and half of the largest float.
+const MOST: f32 = 1.7e38;
+
 /// Stands where no PNG is written.
 const NEUTRAL: Tonemap = Tonemap { scale: 1.0, curve: Curve::Srgb };
 
@@ -178,6 +181,12 @@ impl Range {
                 "a radiance of {:e} is below {:.1e}, the smallest number with all its bits: the exposure is too low",
                 self.low,
                 f32::MIN_POSITIVE
+            )));
+        }
+        if self.high > MOST {
+            return Err(veni_light::Error::invalid(format!(
+                "a radiance of {:.1e} is beyond {MOST:.1e}: the exposure is too high",
+                self.high
             )));
         }
         Ok(())

@@ -3,6 +3,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use veni_light::output::abandon;
 
@@ -10,6 +11,11 @@ use crate::report::complain;
 
 /// What handles the first signal instead of the end of the process.
 static HANDLER: Mutex<Option<Handler>> = Mutex::new(None);
+
+/// Whether the work said something since the first signal came: it is about to end by itself.
+static HEARD: AtomicBool = AtomicBool::new(false);
+/// How long it may say nothing when the system wants the process to end: what asks so kills it outright soon after.
+const PATIENCE: Duration = Duration::from_secs(8);
 
 struct Handler {
     flag: &'static AtomicBool,
@@ -31,11 +37,18 @@ pub(crate) fn handle(said: &'static str) -> &'static AtomicBool {
     flag
 }
 
+/// Part of the work is done, and it has seen by now that a signal came, or will see it at once.
+#[cfg(feature = "learn")]
+pub(crate) fn heard() {
+    HEARD.store(true, Ordering::Relaxed);
+}
+
 /// A signal came. Whether the process is to go on.
 fn goes_on() -> bool {
     let handler = HANDLER.lock().unwrap_or_else(PoisonError::into_inner);
     match &*handler {
         Some(Handler { flag, said }) if !flag.swap(true, Ordering::Relaxed) => {
+            HEARD.store(false, Ordering::Relaxed);
             complain(said);
             true
         }
@@ -49,7 +62,9 @@ mod system {
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
-    use super::{abandon, goes_on};
+    use std::sync::atomic::Ordering;
+
+    use super::{HEARD, PATIENCE, abandon, complain, goes_on};
 
     pub(super) fn watch() -> std::io::Result<()> {
         let ignored = ignored();
@@ -58,13 +73,32 @@ mod system {
         std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
             for signal in signals.forever() {
                 if !goes_on() {
-                    let _written = abandon();
-                    // so that a shell, too, sees which signal it was
-                    let _ = emulate_default_handler(signal);
+                    end(signal);
+                } else if signal != SIGINT {
+                    // whoever presses Ctrl-C can press it again
+                    std::thread::spawn(move || insist(signal));
                 }
             }
         })?;
         Ok(())
+    }
+
+    /// Ends the process if its work has not been heard of in time.
+    fn insist(signal: i32) {
+        std::thread::sleep(PATIENCE);
+        if !HEARD.load(Ordering::Relaxed) {
+            let seconds = PATIENCE.as_secs();
+            complain(&format!(
+                "no step ended within {seconds} s: ended now, the last checkpoint is what there is"
+            ));
+            end(signal);
+        }
+    }
+
+    fn end(signal: i32) {
+        let _written = abandon();
+        // so that a shell, too, sees which signal it was
+        let _ = emulate_default_handler(signal);
     }
 
     fn is_in(set: u64, signal: i32) -> bool {

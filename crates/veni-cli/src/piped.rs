@@ -1,16 +1,16 @@
-//! `-`, pipes and devices in place of files: what comes in is kept in a file of a private folder, since readers go back and
+//! `-` and pipes in place of files: what comes in is kept in a file of a private folder, since readers go back and
 //! forth in it, and what goes out is written there whole before the first byte of it is seen.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Result, anyhow, bail};
 use veni_light::Error;
-use veni_light::output::remember;
+use veni_light::output::{OwnFolder, remember};
 
-use crate::private::PrivateFolder;
+use crate::private::private_folder;
 
 /// Most bytes that are taken from a pipe: more than the largest panorama that is read.
 const MOST: u64 = 4 << 30;
@@ -27,7 +27,7 @@ const ALSO_STDIN: [&str; 3] = ["/dev/stdin", "/dev/fd/0", "/proc/self/fd/0"];
 static HERE: Mutex<Here> = Mutex::new(Here { folder: None, files: Vec::new(), output: None });
 
 struct Here {
-    folder: Option<PrivateFolder>,
+    folder: Option<OwnFolder>,
     /// Copies, and what the user called their sources.
     files: Vec<(PathBuf, PathBuf)>,
     /// What is to go to standard output.
@@ -63,6 +63,9 @@ pub(crate) fn input(path: &Path) -> Result<PathBuf> {
     }
     // what is not there, or is a folder, is reported by whoever reads it
     match path.metadata() {
+        Ok(meta) if is_device(&meta) && !is_same(path, Path::new(STDIN)) => {
+            bail!("{}: is a device, not a file; name a file, or a pipe", path.display())
+        }
         Ok(meta) if !meta.is_file() && !meta.is_dir() => {
             let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
             keep(file, path)
@@ -167,6 +170,19 @@ fn keep(mut from: impl Read, name: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
+/// Whether it is a device, which may have no end: gigabytes would be kept of it.
+#[cfg(unix)]
+fn is_device(meta: &Metadata) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    meta.file_type().is_char_device() || meta.file_type().is_block_device()
+}
+
+/// There are none with a path elsewhere.
+#[cfg(not(unix))]
+fn is_device(_: &Metadata) -> bool {
+    false
+}
+
 /// Whether two names are of one pipe.
 fn is_same(a: &Path, b: &Path) -> bool {
     let is_stdin =
@@ -178,7 +194,7 @@ fn folder() -> Result<PathBuf> {
     let mut here = here();
     let folder = match here.folder.take() {
         Some(folder) => folder,
-        None => PrivateFolder::new()?,
+        None => private_folder()?,
     };
     Ok(here.folder.insert(folder).path().to_path_buf())
 }

@@ -1,5 +1,7 @@
 //! What is reported to the user, and where: results on stdout, notes and errors on stderr.
 
+use std::borrow::Cow;
+use std::ffi::OsString;
 use std::fmt::Display;
 use std::io::{self, Write};
 
@@ -88,9 +90,14 @@ pub(crate) fn error(error: &anyhow::Error) {
 
 /// Prints what is wrong with the command line, or the help that was asked for, and ends.
 pub(crate) fn exit_on_usage(error: &clap::Error) -> ! {
+    // without escape sequences, those of what was typed too
     let text = error.render().to_string();
     let shown = printable_lines(&text);
-    if error.use_stderr() && shown != text {
+    let acts = |argument: &OsString| {
+        let argument = argument.to_string_lossy();
+        matches!(printable_lines(&argument), Cow::Owned(_))
+    };
+    if error.use_stderr() && (shown != text || std::env::args_os().any(|argument| acts(&argument))) {
         // colours would be lost among what is escaped
         write_stderr(&shown);
         std::process::exit(error.exit_code());

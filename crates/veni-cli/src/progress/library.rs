@@ -35,6 +35,7 @@ impl Progress for &ProgressBars {
     }
 
     fn step(&mut self, step: &StepReport, _remaining: f64) {
+        crate::interrupt::heard();
         let parts: Vec<_> = step.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
         let stage = step.stage.as_ref().map(|stage| format!("{stage}, ")).unwrap_or_default();
         ProgressBars::advance(
@@ -45,6 +46,7 @@ impl Progress for &ProgressBars {
     }
 
     fn validation(&mut self, report: &ValidationReport) {
+        crate::interrupt::heard();
         let psnr = |name, scores: &Option<_>| {
             scores.as_ref().map(|s: &Scores| format!("{name} {:.2} dB", s.ldr_psnr))
         };

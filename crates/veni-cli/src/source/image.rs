@@ -9,7 +9,7 @@ use crate::args::Layer;
 use crate::output::with_remedy;
 use crate::report::Report;
 
-/// A panorama with every value positive and finite and nothing unknown; says what was replaced, and what the file says besides.
+/// A panorama with every value finite, none negative, and nothing unknown; says what was replaced, and what the file says besides.
 pub(crate) fn panorama(path: &Path, layer: &Layer, report: Report) -> Result<Panorama> {
     let mut panorama = Panorama::read_with(path, &layer.options()).map_err(with_remedy)?;
     notes(path, panorama.notes(), report);

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail};
 use veni_light::Error;
-use veni_light::field::Decoder;
+use veni_light::field::{Decoder, MAX_COORDINATE};
 use veni_light::latent::{Latent, Prior};
 use veni_light::model::Model;
 use veni_light::random::Stream;
@@ -19,6 +19,11 @@ use crate::args::{Layer, ModelArgs};
 use crate::asked::request_in_words;
 use crate::output::{CUBE_FACES, LATENT, with_remedy};
 use crate::report::Report;
+
+/// Largest exposure of a latent either way: radiance times e to this power is a number with all its bits.
+const MAX_EXPOSURE: f32 = 87.0;
+/// How the images that are read begin: OpenEXR, Radiance, PNG, JPEG, WebP. No text begins so but the second, which is no JSON.
+const IMAGES: [&[u8]; 5] = [b"\x76\x2f\x31\x01", b"#?", b"\x89PNG", b"\xff\xd8\xff", b"RIFF"];
 
 /// The model of `--model`; where none is named, the one inside the program that the first latent in `files` belongs to.
 pub(crate) fn model_of<'a>(args: &ModelArgs, files: impl IntoIterator<Item = &'a Path>) -> Result<Loaded> {
@@ -149,8 +154,21 @@ fn check(latent: &Latent, Loaded { model, name, .. }: &Loaded) -> Result<()> {
         Some(hash) if *hash != model.hash() => {
             bail!("a latent of model {hash}, but {name} is {}: name {}", model.hash(), owner(latent))
         }
-        _ => Ok(()),
+        _ => {}
     }
+    // what the decoder refuses, or would cut off, without knowing of a file
+    let large = |v: &[f32; 3]| v.iter().any(|c| c.abs() > MAX_COORDINATE);
+    if let Some(i) = latent.vectors.iter().position(large) {
+        bail!("latent vector {i} is {:?}, beyond {MAX_COORDINATE}: make the latent again", latent.vectors[i]);
+    }
+    let exposure = latent.log_exposure;
+    if exposure.abs() > MAX_EXPOSURE {
+        bail!(
+            "the exposure is {exposure}, and radiance times e^{exposure} is beyond the range of floats: give the latent one \
+             from -{MAX_EXPOSURE} to {MAX_EXPOSURE}"
+        );
+    }
+    Ok(())
 }
 
 /// Whether an image was edited that has a latent of another model inside the program.
@@ -201,12 +219,13 @@ fn encode(path: &Path, layer: &Layer, loaded: &Loaded, why: &str, report: Report
     Ok(encoded.latent)
 }
 
-/// Whether a file is a latent, and not an image: JSON is a latent; everything else is left to the image readers, which say what
-/// they do not read.
+/// Whether a file is a latent, and not an image: JSON is a latent, and so is what is called so and does not begin as an image;
+/// everything else is left to the image readers, which say what they do not read.
 pub(crate) fn is_latent(path: &Path) -> Result<bool> {
     let mut start = Vec::new();
     let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
     file.take(64).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
     let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    Ok(named || begins_object(&start))
+    let is_image = IMAGES.iter().any(|image| start.starts_with(image));
+    Ok(named && !is_image || begins_object(&start))
 }

@@ -64,10 +64,12 @@ impl Images<'_> {
         let [width, height] = picture.size();
         let known = |p: usize| {
             let finite = picture.pixels()[p].iter().all(|v| v.is_finite());
-            if finite { picture.known().map_or(1.0, |k| k[p].clamp(0.0, 1.0)) } else { 0.0 }
+            if finite { picture.known().map_or(1.0, |k| k[p].clamp(0.0, 1.0).max(0.0)) } else { 0.0 }
         };
         let known: Vec<f32> = (0..width * height).map(known).collect();
-        let radiance = |p: usize| if known[p] > 0.0 { picture.pixels()[p] } else { [0.0; 3] };
+        // what is below 0, as a colour outside of Rec. 709 is, was fitted as black
+        let radiance =
+            |p: usize| if known[p] > 0.0 { picture.pixels()[p].map(|v| v.max(0.0)) } else { [0.0; 3] };
         if let Some(view) = &self.view {
             let at = |d: [f32; 3]| view.pixel_of(d, width, height);
             let hits: Vec<_> = grid.directions().into_iter().map(at).collect();

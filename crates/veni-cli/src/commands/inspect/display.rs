@@ -32,11 +32,16 @@ fn display(image: &LdrPanorama) -> Facts {
     let coding = image.coding();
     facts.add("values", coding.as_str(), coding.as_str());
     reservations(image.notes(), image.unknown(), &mut facts);
-    let count = grid.len() as f64;
-    let clipped = image.values().iter().filter(|p| p.iter().any(|v| *v >= CLIPPED)).count() as f64 / count;
+    // what is unknown is neither clipped nor dark
+    let known = |at: usize| image.known().map_or(1.0, |known| f64::from(known[at]));
+    let count: f64 = (0..grid.len()).map(known).sum::<f64>().max(f64::MIN_POSITIVE);
+    let over =
+        |value: &dyn Fn(usize) -> f64| (0..grid.len()).map(|at| known(at) * value(at)).sum::<f64>() / count;
+    let is_clipped = |at: usize| image.values()[at].iter().any(|v| *v >= CLIPPED);
+    let clipped = over(&|at| f64::from(u8::from(is_clipped(at))));
     facts.add("clipped", format!("{:.1} % of the pixels", 100.0 * clipped), clipped);
-    let mean =
-        image.linear(Transfer::Srgb).pixels().iter().map(|p| f64::from(luminance(*p))).sum::<f64>() / count;
+    let linear = image.linear(Transfer::Srgb);
+    let mean = over(&|at| f64::from(luminance(linear.pixels()[at])));
     facts.add("mean luminance", format!("{mean:.4} of white"), mean);
     facts
 }

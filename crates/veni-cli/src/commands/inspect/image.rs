@@ -53,6 +53,14 @@ pub(super) fn radiance(mut image: Panorama, path: &Path, facts: &mut Facts) -> R
         facts.add("size", format!("{} x {}", grid.width, grid.height), json!([grid.width, grid.height]));
     }
     match image.provenance() {
+        // of older programs; `bake` decodes to see
+        Provenance::Unrecorded if image.attributes().contains_key(LATENT) => {
+            facts.add(
+                "pixels",
+                "not known to be those of the latent: no digest was written with it",
+                "unknown",
+            );
+        }
         Provenance::Unrecorded => {}
         Provenance::Same => facts.add("pixels", "those that the attributes were written with", "same"),
         Provenance::Changed => facts.add(
@@ -67,8 +75,8 @@ pub(super) fn radiance(mut image: Panorama, path: &Path, facts: &mut Facts) -> R
     if bad.total() > 0 {
         facts.add(
             "bad values",
-            format!("{} NaN, {} infinite, {} not positive", bad.nan, bad.infinite, bad.not_positive),
-            json!({ "nan": bad.nan, "infinite": bad.infinite, "not_positive": bad.not_positive }),
+            format!("{} NaN, {} infinite, {} negative", bad.nan, bad.infinite, bad.negative),
+            json!({ "nan": bad.nan, "infinite": bad.infinite, "negative": bad.negative }),
         );
     }
     let s = Statistics::of(&image);

@@ -16,6 +16,8 @@ const OCTAVES: f32 = 128.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Statistics {
     pub(super) min: f32,
+    /// Of the pixels that are not black.
+    darkest: f32,
     pub(super) max: f32,
     pub(super) mean: f64,
     pub(super) median: f32,
@@ -44,9 +46,9 @@ impl Sun {
 }
 
 impl Statistics {
-    /// Stops between the darkest and the brightest pixel.
+    /// Stops between the darkest pixel that is not black and the brightest.
     pub(super) fn stops(self) -> f32 {
-        (self.max / self.min).log2()
+        (self.max / self.darkest).log2()
     }
 
     /// The panorama must be clean ([`Panorama::sanitise`]).
@@ -54,12 +56,16 @@ impl Statistics {
         let (grid, unit) = (image.grid(), image.unit());
         let rows =
             || image.pixels().chunks_exact(grid.width).enumerate().map(|(j, r)| (j, grid.solid_angle(j), r));
-        let (mut min, mut max, mut total, mut sphere) = (f32::INFINITY, 0f32, 0.0, 0.0);
+        let (mut min, mut darkest, mut max) = (f32::INFINITY, f32::INFINITY, 0f32);
+        let (mut total, mut sphere) = (0.0, 0.0);
         let mut histogram = vec![0f64; (OCTAVES * BINS_PER_OCTAVE) as usize];
         for (_, weight, row) in rows() {
             for pixel in row {
                 let y = luminance(*pixel);
                 (min, max) = (min.min(y), max.max(y));
+                if y > 0.0 {
+                    darkest = darkest.min(y);
+                }
                 total += weight * f64::from(y);
                 sphere += weight;
                 histogram[bin(y / unit)] += weight;
@@ -87,7 +93,7 @@ impl Statistics {
         }
         let length = sum.iter().map(|s| s * s).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
         let sun = Sun { direction: sum.map(|s| s / length), share: light / total };
-        Self { min, max, mean: total / sphere, median, sun }
+        Self { min, darkest, max, mean: total / sphere, median, sun }
     }
 }
 

@@ -79,27 +79,45 @@ pub(super) fn text(name: &str, light: &Light, convention: Option<Convention>, lu
     }
     let unit = lux.unwrap_or(1.0);
     let at = |way: [f32; 3]| unit * f64::from(luminance(light.irradiance(way)));
-    let [up, down, front, left, back, right] = WAYS.map(|(_, way)| at(way));
+    let [up, down, front, left, back, right] = WAYS.map(|(_, way)| number(at(way)));
     let _ = writeln!(
         out,
-        "  E        up {up:.4}, down {down:.4}; front {front:.4}, left {left:.4}, back {back:.4}, right {right:.4}{}",
+        "  E        up {up}, down {down}; front {front}, left {left}, back {back}, right {right}{}",
         if lux.is_some() { " lux" } else { "" }
     );
-    let [r, g, b] = light.mean();
-    let _ = write!(out, "  mean     {r:.4} {g:.4} {b:.4}{}", white(light.irradiance([0.0, 0.0, 1.0])));
+    let [r, g, b] = light.mean().map(|v| number(f64::from(v)));
+    let _ = write!(out, "  mean     {r} {g} {b}{}", white(light.irradiance([0.0, 0.0, 1.0])));
     let shown = convention.unwrap_or(Convention::Native);
     let _ = write!(out, "\n  sh       {} (whole; --json has the residual's too)", shown.name());
-    for [r, g, b] in shown.of(&light.sh()) {
-        let _ = write!(out, "\n           {r:>12.6} {g:>12.6} {b:>12.6}");
+    let sh = shown.of(&light.sh());
+    let largest = sh.as_flattened().iter().fold(0f32, |most, v| most.max(v.abs()));
+    for [r, g, b] in sh {
+        let _ = if ORDINARY.contains(&largest) {
+            write!(out, "\n           {r:>12.6} {g:>12.6} {b:>12.6}")
+        } else {
+            write!(out, "\n           {r:>12.4e} {g:>12.4e} {b:>12.4e}")
+        };
     }
     out
 }
 
+/// Numbers of this size are shown with a fixed number of decimals; others by powers of ten, or they would be zeros.
+const ORDINARY: std::ops::Range<f32> = 0.01..1e6;
+
+fn number(value: f64) -> String {
+    if value == 0.0 || ORDINARY.contains(&(value.abs() as f32)) {
+        format!("{value:.4}")
+    } else {
+        format!("{value:.4e}")
+    }
+}
+
 fn line(out: &mut String, name: &str, light: &CompactLight, share: f32) {
-    let ([x, y, z], [r, g, b]) = (light.direction, light.irradiance);
+    let [x, y, z] = light.direction;
+    let [r, g, b] = light.irradiance.map(|v| number(f64::from(v)));
     let _ = writeln!(
         out,
-        "  {name:<8} el {:.2}° az {:.2}° ({x:.4} {y:.4} {z:.4})  radius {:.3}° {}  E⊥ {r:.4} {g:.4} {b:.4}  {:.0} % of what faces it  {}{}",
+        "  {name:<8} el {:.2}° az {:.2}° ({x:.4} {y:.4} {z:.4})  radius {:.3}° {}  E⊥ {r} {g} {b}  {:.0} % of what faces it  {}{}",
         light.elevation().to_degrees(),
         light.azimuth().to_degrees(),
         light.radius.to_degrees(),
@@ -133,6 +151,12 @@ fn white([r, g, b]: [f32; 3]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn small_and_large_numbers_keep_their_digits() {
+        assert_eq!([0.0, 0.5, 123.45678, -0.25].map(number), ["0.0000", "0.5000", "123.4568", "-0.2500"]);
+        assert_eq!([1.25e-8, 3e9].map(number), ["1.2500e-8", "3.0000e9"]);
+    }
 
     #[test]
     fn the_white_of_the_primaries_is_daylight() {

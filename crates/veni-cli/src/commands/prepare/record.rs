@@ -56,7 +56,9 @@ pub(super) struct Facts {
 pub(super) struct Replaced {
     pub(super) nan: usize,
     pub(super) infinite: usize,
-    pub(super) not_positive: usize,
+    // before it was negative ones alone, zeros counted too
+    #[serde(alias = "not_positive")]
+    pub(super) negative: usize,
 }
 
 /// What was rebuilt of an LDR panorama.
@@ -112,7 +114,7 @@ impl Record {
 
 impl Facts {
     pub(super) fn new(id: String, examined: &Examined, network: Option<&NetworkSettings>) -> Self {
-        let Sanitised { nan, infinite, not_positive, .. } = examined.replaced;
+        let Sanitised { nan, infinite, negative, .. } = examined.replaced;
         let by = |(estimate, network): (Estimate, &NetworkSettings)| ByNetwork {
             model: network.model.clone(),
             sha256: network.sha256,
@@ -131,7 +133,7 @@ impl Facts {
             height: examined.size.height,
             stops: examined.stops,
             log_exposure: examined.panorama.mean_log_luminance(),
-            replaced: Replaced { nan, infinite, not_positive },
+            replaced: Replaced { nan, infinite, negative },
             expanded: examined.expanded.map(expansion),
             fingerprint: examined.fingerprint.clone(),
             notes: examined.notes.clone(),

@@ -243,11 +243,7 @@ fn expanded(record: &Record, file: &str) -> Option<String> {
 
 fn replaced(record: &Record, file: &str) -> Option<String> {
     let r = record.facts()?.replaced;
-    let all = r.nan + r.infinite + r.not_positive;
-    (all > 0).then(|| {
-        format!(
-            "{file}: {} not a number, {} infinite, {} zero or negative",
-            r.nan, r.infinite, r.not_positive
-        )
-    })
+    let all = r.nan + r.infinite + r.negative;
+    (all > 0)
+        .then(|| format!("{file}: {} not a number, {} infinite, {} negative", r.nan, r.infinite, r.negative))
 }

@@ -112,7 +112,8 @@ fn unreadable(input: &Path, error: &walkdir::Error) -> (PathBuf, String) {
     let path = error.path().unwrap_or(input).to_path_buf();
     let reason = match (error.loop_ancestor(), error.io_error()) {
         (Some(above), _) => format!("is a link to {}, which it is in", above.display()),
-        (None, _) if path.is_symlink() && !path.exists() => {
+        // a loop of links is there, and what the system says of it comes below
+        (None, _) if path.is_symlink() && is_missing(&path) => {
             let target = std::fs::read_link(&path).unwrap_or_default();
             format!("is a link to {}, which is not there", target.display())
         }
@@ -120,6 +121,10 @@ fn unreadable(input: &Path, error: &walkdir::Error) -> (PathBuf, String) {
         (None, None) => "cannot be looked at".to_owned(),
     };
     (path, reason)
+}
+
+fn is_missing(path: &Path) -> bool {
+    path.metadata().is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
 }
 
 /// Paths in a row, for messages.

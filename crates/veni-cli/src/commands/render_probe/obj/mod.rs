@@ -1,5 +1,7 @@
 //! Wavefront OBJ files: all objects of one as a mesh in the native frame.
 
+mod polygon;
+
 use std::path::Path;
 
 use anyhow::{Result, anyhow, bail};
@@ -8,6 +10,8 @@ use veni_fit::shade::Mesh;
 use veni_light::limits::{at_most, read_file};
 use veni_light::text;
 
+use polygon::triangles;
+
 /// Bytes of an OBJ file: the largest scans have a few hundred MB.
 const MAX_OBJ_BYTES: u64 = 1 << 30;
 /// Corners of its faces, each of which takes some 100 bytes in memory and two in the file: a scan of 11 million triangles.
@@ -15,6 +19,9 @@ const MAX_OBJ_CORNERS: u64 = 1 << 25;
 /// A mesh whose centre is farther away than this many times its size loses digits in single precision that are seen
 /// (2⁻²⁴ of the distance): it is moved to the origin first.
 const FAR: f64 = 16.0;
+
+/// Bytes of memory for each of them, in the parser's lists, in ours and in the search tree: measured.
+const CORNER_BYTES: u64 = 200;
 
 /// Which axis of a mesh points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -32,6 +39,23 @@ pub(super) struct Placed {
     pub(super) origin: [f64; 3],
 }
 
+/// Refuses what memory does not hold, before the parser asks for it: it ends the process where it gets none.
+fn fits(corners: usize) -> veni_light::Result<()> {
+    let needed = corners as u64 * CORNER_BYTES;
+    let left = veni_image::memory::available().unwrap_or(u64::MAX);
+    if needed <= left {
+        return Ok(());
+    }
+    let [need, have] = [needed, left].map(|bytes| bytes >> 20);
+    Err(veni_light::Error::beyond(
+        format!(
+            "its {corners} corners of faces need {need} MiB of memory, and {have} MiB are available: simplify the mesh"
+        ),
+        needed,
+        left,
+    ))
+}
+
 /// Reads a file; every triangle has three vertices of its own.
 pub(super) fn read(path: &Path, up: Up) -> Result<Placed> {
     let bytes = read_file(path, "a Wavefront OBJ file that is read", MAX_OBJ_BYTES)?;
@@ -40,6 +64,13 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Placed> {
     let text = statements(&text);
     let [with, without] = corners(&text);
     at_most("corners of faces", (with + without) as u64, MAX_OBJ_CORNERS).map_err(|e| e.in_file(path))?;
+    fits(with + without).map_err(|e| e.in_file(path))?;
+    if names_zero(&text) {
+        bail!(
+            "{}: a face names a vertex, a texture coordinate or a normal by 0: they are counted from 1",
+            path.display()
+        );
+    }
     if with > 0 && without > 0 {
         bail!(
             "{}: {without} of {} corners of faces lack normals: give all of them one, or none",
@@ -48,7 +79,8 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Placed> {
         );
     }
     let options = tobj::LoadOptions {
-        triangulate: true,
+        // as fans, which leave a concave face
+        triangulate: false,
         ignore_points: true,
         ignore_lines: true,
         ..Default::default()
@@ -64,10 +96,29 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Placed> {
     };
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
     for tobj::Model { mesh, .. } in &models {
-        positions.extend(mesh.indices.iter().map(|at| native(&mesh.positions[3 * *at as usize..])));
-        if with > 0 {
-            let normal = |at: &u32| native(&mesh.normals[3 * *at as usize..]).map(|c| c as f32);
-            normals.extend(mesh.normal_indices.iter().map(normal));
+        let mut first = 0;
+        // nothing is said where all are triangles
+        let arities = if mesh.face_arities.is_empty() {
+            vec![3; mesh.indices.len() / 3]
+        } else {
+            mesh.face_arities.clone()
+        };
+        for arity in arities.into_iter().map(|n| n as usize) {
+            let corner = |at: &u32| native(&mesh.positions[3 * *at as usize..]);
+            let corners: Vec<_> = mesh.indices[first..first + arity].iter().map(corner).collect();
+            for at in triangles(&corners).map_err(|e| e.in_file(path))?.into_iter().flatten() {
+                positions.push(corners[at]);
+                if with > 0 {
+                    // what looks like the number of a normal may be none to the parser
+                    let number = mesh.normal_indices.get(first + at).map(|number| 3 * *number as usize);
+                    let normal = number.and_then(|at| mesh.normals.get(at..at + 3));
+                    let normal = normal.ok_or_else(|| {
+                        anyhow!("{}: a corner of a face names a normal that is not there", path.display())
+                    })?;
+                    normals.push(native(normal).map(|c| c as f32));
+                }
+            }
+            first += arity;
         }
     }
     let count = u32::try_from(positions.len())
@@ -86,7 +137,7 @@ fn decode(bytes: Vec<u8>) -> Option<String> {
     if is_marked || !bytes.contains(&0) && std::str::from_utf8(&bytes).is_ok() {
         return text::decode(bytes).ok();
     }
-    let text = (!bytes.contains(&0)).then(|| String::from_utf8_lossy(&bytes).into_owned());
+    let text = (!bytes.contains(&0)).then(|| text::line_ends(String::from_utf8_lossy(&bytes).into_owned()));
     text.filter(|text| text.lines().any(|line| line.trim_start().starts_with("v ")))
 }
 
@@ -130,6 +181,12 @@ fn corners(statements: &str) -> [usize; 2] {
     counts
 }
 
+/// Whether a face names something by 0: numbers begin at 1, or at -1 from the end.
+fn names_zero(statements: &str) -> bool {
+    let faces = statements.lines().filter_map(|line| line.trim_start().strip_prefix("f "));
+    faces.flat_map(str::split_whitespace).any(|corner| corner.split('/').any(|number| number == "0"))
+}
+
 /// What is wrong with the file.
 fn explain(error: tobj::LoadError) -> String {
     use tobj::LoadError as E;
@@ -162,6 +219,14 @@ mod tests {
         let text = decode(b"# W\xfcrfel\nv 1 2 3\n".to_vec()).unwrap();
         assert_eq!(statements(&text), "\nv 1 2 3\n");
         assert_eq!(decode(b"\xef\xbb\xbfv 1 2 3".to_vec()).unwrap(), "v 1 2 3");
+        for name in [&b"W\xfcrfel"[..], b"cube"] {
+            let bytes = [b"# ", name, b"\rv 1 2 3\rv 4 5 6\r"].concat();
+            assert_eq!(
+                statements(&decode(bytes).unwrap()),
+                "\nv 1 2 3\nv 4 5 6\n",
+                "lines that end in CR alone"
+            );
+        }
         assert_eq!((decode(b"v 1\0".to_vec()), decode(b"\xe9\0".to_vec())), (None, None));
     }
 
@@ -176,5 +241,56 @@ mod tests {
         let Placed { mesh, origin } = read(&path, Up::Z).unwrap();
         assert_eq!(origin, [5_000_000.5, 4_000_000.5, 100.25]);
         assert_eq!(mesh.positions[1], [0.5, -0.5, 0.25]);
+    }
+
+    /// A normal that is not there is an error, and none where the text has only its slashes.
+    #[test]
+    fn a_normal_that_is_none_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        let of = |face: &str| {
+            std::fs::write(&path, format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n{face}\n")).unwrap();
+            read(&path, Up::Z).map(|placed| placed.mesh.normals).map_err(|e| e.to_string())
+        };
+        assert!(of("f 1//9 2//9 3//9").unwrap_err().contains("a.obj"));
+        for face in ["f 1//x 2//x 3//x", "f 1//0 2//0 3//0", "f 1/1/ 2/1/ 3/1/", "f 1//- 2//- 3//-"] {
+            assert!(of(face).map_or_else(|e| e.contains("a.obj"), |normals| normals.is_none()), "{face}");
+        }
+    }
+
+    /// An L of three squares, whose fan from most of its corners would be another shape.
+    #[test]
+    fn concave_faces_keep_their_shape_and_their_normals() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("l.obj");
+        let corners = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]];
+        let of = |from: usize, normals: bool| {
+            let mut text: String = corners.iter().map(|[x, y]| format!("v {x} {y} 5\n")).collect();
+            text += &corners.iter().map(|[x, y]| format!("vn {x} {y} 1\n")).collect::<String>();
+            let at = (0..6).map(|k| (from + k) % 6 + 1);
+            let named = at.map(|k| if normals { format!(" {k}//{k}") } else { format!(" {k}") });
+            std::fs::write(&path, format!("{text}f{}\nf 1 2 3\n", named.collect::<String>())).unwrap();
+            if normals {
+                let text = std::fs::read_to_string(&path).unwrap().replace("f 1 2 3", "f 1//1 2//2 3//3");
+                std::fs::write(&path, text).unwrap();
+            }
+            read(&path, Up::Z).unwrap().mesh
+        };
+        let area = |mesh: &Mesh| -> f32 {
+            let twice = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(|at| mesh.positions[at as usize]);
+                (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+            };
+            assert!(mesh.triangles.iter().all(|t| twice(t) > 0.0), "all of one winding");
+            mesh.triangles.iter().map(|t| 0.5 * twice(t)).sum()
+        };
+        for from in 0..6 {
+            for normals in [true, false] {
+                let mesh = of(from, normals);
+                assert_eq!((area(&mesh), mesh.triangles.len()), (3.0 + 1.0, 5), "from corner {from}");
+                let own = |(p, n): (&[f32; 3], &[f32; 3])| p[..2] == n[..2];
+                assert!(mesh.normals.iter().all(|normals| mesh.positions.iter().zip(normals).all(own)));
+            }
+        }
     }
 }
