@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Runs every test, with the one build profile of the project, but those on burn's other devices, ndarray and wgpu (.ci/run).
-# Arguments, if any, go to cargo test and choose instead: scripts/test.sh -p veni-light --lib sphere
+# Runs every test of the default build. Arguments, if any, go to cargo test and choose instead:
+#   scripts/test.sh -p veni-light --lib sphere
+# VENI_FEATURES: features beside those, say veni-cli/avif,veni-cli/onnx (.ci/run has all that run here).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/setup.sh
 # gpu: the golden fields are computed by the GPU decoder too.
-test=(cargo test --release --workspace --features veni/gpu)
+test=(cargo test --workspace --features "veni/gpu${VENI_FEATURES:+,$VENI_FEATURES}")
 if (($#)); then
     exec "${test[@]}" "$@"
 fi
