@@ -59,12 +59,18 @@ pub(super) struct Step {
     pub(super) density: Columns,
 }
 
+/// x⁻⁴, correctly rounded. Of `powi` the last bit depends on whether the compiler knows x, and so on the profile.
+fn inverse_fourth(x: f32) -> f32 {
+    let square = f64::from(x) * f64::from(x);
+    (1.0 / (square * square)) as f32
+}
+
 impl Atmosphere {
     /// `ozone` is in Dobson units.
     pub(super) fn new(turbidity: f32, ozone: f32, albedo: f32) -> Self {
         let beta = (0.046_08 * turbidity - 0.045_86).max(1e-3);
         let mut this = Self {
-            rayleigh: WAVELENGTHS.map(|w| 1.240_62e-3 * (w * 1e-3).powi(-4)),
+            rayleigh: WAVELENGTHS.map(|w| 1.240_62e-3 * inverse_fourth(w * 1e-3)),
             mie: WAVELENGTHS.map(|w| beta * (w * 1e-3).powf(-1.3) / MIE_HEIGHT),
             // a layer as high as its peak and 15 km thick
             ozone: OZONE.map(|sigma| sigma * ozone * 2.687e20 / 15e3 * 1e3),

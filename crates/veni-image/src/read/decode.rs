@@ -90,6 +90,11 @@ pub(super) fn decode(path: &Path, options: &ReadOptions) -> Result<Decoded> {
         }
         ImageError::IoError(e) if e.raw_os_error().is_some() => Error::io(path, "read", e),
         ImageError::Unsupported(e) => Error::unsupported(format!("{name}: {e}")),
+        ImageError::Limits(_) => Error::too_large(format!(
+            "its {name} decoder asks for more than the {} MiB that {} pixels are given",
+            allocation(options) >> 20,
+            options.max_pixels
+        )),
         other => Error::invalid(format!("damaged or truncated {name} file: {other}")),
     };
     precheck::budget(precheck::ldr(&mut file, path, format)?, options)?;
@@ -126,9 +131,13 @@ pub(super) fn decode(path: &Path, options: &ReadOptions) -> Result<Decoded> {
 }
 
 /// 8 bytes of the largest sample layout per pixel, and as much again for a decoder's own buffers.
+fn allocation(options: &ReadOptions) -> u64 {
+    options.max_pixels.saturating_mul(16) as u64
+}
+
 fn limits(options: &ReadOptions) -> Limits {
     let mut limits = Limits::default();
-    limits.max_alloc = Some(options.max_pixels.saturating_mul(16) as u64);
+    limits.max_alloc = Some(allocation(options));
     limits
 }
 

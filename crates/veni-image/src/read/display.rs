@@ -81,6 +81,10 @@ fn exif(tags: &Tags) -> Result<Meaning> {
             meaning
                 .note("its EXIF data say that it is not sRGB, but nothing says what it is: taken for sRGB");
         }
+        Some(ColourSpace::Both) => {
+            meaning
+                .note("its EXIF data say sRGB in one place and Adobe RGB (R03) in another: taken for sRGB");
+        }
         Some(ColourSpace::Srgb) | None => {}
     }
     Ok(meaning)

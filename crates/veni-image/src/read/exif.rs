@@ -9,6 +9,8 @@ pub(super) enum ColourSpace {
     Srgb,
     /// By the DCF's option file, or by the value 2 that some cameras write.
     AdobeRgb,
+    /// The value of sRGB in an option file, which is Adobe RGB.
+    Both,
     /// 0xFFFF: something else, which a profile is to say.
     Uncalibrated,
 }
@@ -40,8 +42,9 @@ pub(super) fn colour_space(exif: &[u8]) -> ColourSpace {
     };
     match tiff.exif().and_then(|exif| tiff.entry(exif, 0xA001)).and_then(|value| tiff.short(value)) {
         Some(2) => ColourSpace::AdobeRgb,
-        Some(0xFFFF) if adobe_file() == Some(true) => ColourSpace::AdobeRgb,
+        Some(0xFFFF) | None if adobe_file() == Some(true) => ColourSpace::AdobeRgb,
         Some(0xFFFF) => ColourSpace::Uncalibrated,
+        Some(1) if adobe_file() == Some(true) => ColourSpace::Both,
         _ => ColourSpace::Srgb,
     }
 }

@@ -16,8 +16,26 @@ pub(super) const EXTENSION: &str = "http://ns.adobe.com/xmp/note/";
 pub(super) const TIFF: &str = "http://ns.adobe.com/tiff/1.0/";
 
 /// The text of a packet: UTF-8, or by its first bytes UTF-16 or UTF-32 (ISO 16684-1, 7.1). What is none becomes U+FFFD: one
-/// wrong byte in a title is no reason to forget where the picture lies in its panorama.
+/// wrong byte in a title is no reason to forget where the picture lies in its panorama. Without comments, which say nothing.
 pub(super) fn text(bytes: &[u8]) -> String {
+    without_comments(decoded(bytes))
+}
+
+/// What stands between `<!--` and `-->`, or behind the first that is not closed, is left out.
+fn without_comments(packet: String) -> String {
+    let mut left = packet.as_str();
+    let mut said = String::new();
+    while let Some((before, comment)) = left.split_once("<!--") {
+        said.push_str(before);
+        left = comment.split_once("-->").map_or("", |(_, behind)| behind);
+    }
+    if said.is_empty() && left.len() == packet.len() {
+        return packet;
+    }
+    said + left
+}
+
+fn decoded(bytes: &[u8]) -> String {
     let units = |rest: &[u8], unit: fn([u8; 2]) -> u16| -> String {
         let units = rest.as_chunks().0.iter().map(|pair| unit(*pair));
         char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
@@ -118,6 +136,7 @@ mod tests {
         }
         assert_eq!(text(b"<a>caf\xe9</a>"), "<a>caf\u{FFFD}</a>");
         assert_eq!(text(b"<\0a"), "<");
+        assert_eq!(text(b"a<!-- b -->c<!--d--><!---->e<!-- f"), "ace");
     }
 
     #[test]

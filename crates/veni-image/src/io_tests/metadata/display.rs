@@ -20,6 +20,7 @@ pub(super) const CASES: &[Case] = &[
     ("PNG, JPEG, WebP", "ICC profile with the curve of PQ or HLG, without cicp", unnamed_curve),
     ("PNG, JPEG, WebP", "EXIF Orientation", orientation),
     ("PNG, JPEG, WebP", "EXIF ColorSpace = Adobe RGB (or R03)", adobe),
+    ("PNG, JPEG, WebP", "EXIF ColorSpace = sRGB beside R03", both),
     ("PNG, JPEG, WebP", "EXIF ColorSpace = uncalibrated", uncalibrated),
     ("PNG, JPEG, WebP", "alpha", alpha),
     ("PNG, JPEG, WebP", "XMP GPano, cropped", crop),
@@ -247,13 +248,22 @@ fn adobe() {
     let adobe = |v: f32| v.powf(563.0 / 256.0);
     // Adobe RGB (1998) to Rec. 709, both with D65
     let expected = |[r, g, b]: [f32; 3]| [1.398_28 * r - 0.398_28 * g, g, -0.042_93 * g + 1.042_93 * b];
-    for exif in [exif(1, 2, b"R98\0"), exif(1, 0xFFFF, b"R03\0")] {
+    // 0xA002, the width, in place of the colour space
+    let mut unsaid = exif(1, 1, b"R03\0");
+    unsaid[41] = 2;
+    for exif in [exif(1, 2, b"R98\0"), exif(1, 0xFFFF, b"R03\0"), unsaid] {
         close(png(COLOUR, &[(b"eXIf", &exif)]).first(), expected(COLOUR.map(adobe)));
         let profile = ColorProfile::new_srgb().encode().unwrap();
         close(png_icc(COLOUR, &profile, &[(b"eXIf", &exif)]).first(), COLOUR.map(srgb_to_linear));
     }
     let plain = png(COLOUR, &[(b"eXIf", &exif(1, 1, b"R98\0"))]);
     assert_eq!((plain.first(), plain.notes()), (png(COLOUR, &[]).first(), String::new()));
+}
+
+fn both() {
+    let file = png(COLOUR, &[(b"eXIf", &exif(1, 1, b"R03\0"))]);
+    assert_eq!(file.first(), png(COLOUR, &[]).first());
+    assert!(file.notes().contains("R03"), "{}", file.notes());
 }
 
 fn uncalibrated() {

@@ -75,6 +75,11 @@ fn encodings() {
     let values = "h:GainMapMax='3' h:OffsetSDR='0' h:OffsetHDR='0'";
     let values = [packet(HDRGM, "h", values).as_bytes(), b"<!-- caf\xe9 -->"].concat();
     assert!(is_three_stops(&with_map(&announced, &values)));
+    // comments say nothing
+    let other = HALF.replace("='16'", "='32'").replace("G:", "H:");
+    let comment = format!("<!-- xmlns:H='{GPANO}' {other} -->{words}");
+    everywhere(comment.as_bytes()).iter().for_each(|file| assert!(is_half(file), "{}", file.notes()));
+    everywhere(format!("<!-- {words} -->").as_bytes()).iter().for_each(|file| assert!(!is_half(file)));
 }
 
 fn orientation() {

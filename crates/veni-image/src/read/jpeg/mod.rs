@@ -43,13 +43,16 @@ pub(super) fn ends(bytes: &[u8]) -> bool {
     scan(bytes).is_none_or(|scan| find(bytes, scan, &[0xFF, 0xD9]).is_some())
 }
 
-/// Whatever begins like a picture behind the end of the first (CIPA DC-007 puts them there).
+/// Whatever begins like a picture behind the end of the first (CIPA DC-007 puts them there). What lies in the segments of one is
+/// not looked at as another: a thumbnail is no picture of the file, and each byte is walked over once.
 pub(super) fn others(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut from = scan(bytes).and_then(|scan| find(bytes, scan, &[0xFF, 0xD9]));
     std::iter::from_fn(move || {
         let start = find(bytes, from?, &[0xFF, 0xD8, 0xFF])?;
-        from = Some(start + 3);
-        Some(&bytes[start..])
+        let other = &bytes[start..];
+        let header = walk(other).last().map_or(3, |(at, _, content)| at + 4 + content.len());
+        from = Some(start + header);
+        Some(other)
     })
 }
 
@@ -84,4 +87,20 @@ fn has_profile(bytes: &[u8]) -> bool {
 pub(super) fn has_iso_gain_map(bytes: &[u8]) -> bool {
     segments(bytes)
         .any(|(marker, content)| marker == 0xE2 && content.starts_with(b"urn:iso:std:iso:ts:21496:-1"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_in_the_segments_of_a_picture_is_no_other() {
+        // a scan, its end, a picture; then one of whose segments each begins like one
+        let first = b"\xFF\xD8\xFF\xDA\0\x02\x00\xFF\xD9";
+        let second = b"\xFF\xD8\xFF\xE1\0\x05\xFF\xD8\xFF\xFF\xDA\0\x02\x00\xFF\xD9";
+        let nested = b"\xFF\xE1\0\x08\xFF\xD8\xFF\xE1\0\x02".repeat(300_000);
+        let bytes = [&first[..], second, b"\xFF\xD8", &nested].concat();
+        let starts: Vec<_> = others(&bytes).map(|other| bytes.len() - other.len()).collect();
+        assert_eq!(starts, [first.len(), first.len() + second.len()]);
+    }
 }
