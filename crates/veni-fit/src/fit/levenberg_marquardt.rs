@@ -45,11 +45,10 @@ impl QuadraticModel {
         Self { value, gradient, matrix, vectors, free }
     }
 
-    /// That of the lobes alone.
-    pub(super) fn of_lobes(self) -> Self {
-        let (n, first) = (self.gradient.len(), 3 * self.vectors + usize::from(self.free));
-        let matrix = self.matrix.chunks_exact(n).skip(first).flat_map(|row| &row[first..]).copied().collect();
-        Self { gradient: self.gradient[first..].to_vec(), matrix, vectors: 0, free: false, ..self }
+    /// Of lobes alone.
+    pub(super) fn of_lobes(equations: NormalEquations) -> Self {
+        let NormalEquations { loss: value, gradient, matrix } = equations;
+        Self { value, gradient, matrix, vectors: 0, free: false }
     }
 
     /// With a penalty on the vectors' coordinates added.

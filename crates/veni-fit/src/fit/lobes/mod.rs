@@ -16,7 +16,7 @@ use super::target::FitTarget;
 use super::{check_prior, check_starts};
 use crate::{Error, Result};
 use pursuit::Pursuit;
-use veni_light::field::{Decoder, LocalQuadratic};
+use veni_light::field::{Decoder, LocalQuadratic, NormalEquations};
 use veni_light::latent::{Latent, Prior};
 use veni_light::limits;
 
@@ -98,7 +98,8 @@ pub fn fit_lobes(
         observer(made, loss);
         made += 1;
     };
-    latents.iter().zip(&losses).map(|(z, loss)| Image { shared: &shared, loss }.fit(z, &mut count)).collect()
+    let fit = |(z, loss)| Image::new(&shared, loss, z)?.fit(z, &mut count);
+    latents.iter().zip(&losses).map(fit).collect()
 }
 
 /// What the fits of all images share.
@@ -119,9 +120,17 @@ struct Shared<'a> {
 struct Image<'a> {
     shared: &'a Shared<'a>,
     loss: &'a PixelLoss<'a>,
+    /// The log radiance to which lobes are added, where they alone move.
+    base: Option<Vec<[f32; 3]>>,
 }
 
-impl Image<'_> {
+impl<'a> Image<'a> {
+    fn new(shared: &'a Shared<'a>, loss: &'a PixelLoss<'a>, start: &Latent) -> Result<Self> {
+        let without = || shared.log_radiance(&Latent { lobes: Vec::new(), ..start.clone() });
+        let base = shared.plan.only_lobes.then(without).transpose()?;
+        Ok(Self { shared, loss, base })
+    }
+
     fn fit(&self, start: &Latent, observer: &mut dyn FnMut(f64)) -> Result<(Latent, f64)> {
         let Shared { plan: LobePlan { count, .. }, config: FitConfig { steps, .. }, .. } = *self.shared;
         let mut latent = start.clone();
@@ -157,25 +166,30 @@ impl Image<'_> {
     }
 
     fn model(&self, latent: &Latent) -> Result<QuadraticModel> {
-        let Shared { decoder, directions, penalty, hessian, plan, config, .. } = self.shared;
-        let field = decoder.condition(latent)?;
-        let found = field.normal_equations_with_lobes(directions, |i, p| local_quadratic(self.loss, i, p));
-        let all = QuadraticModel::new(found, latent.vectors.len(), config.free_exposure);
-        let moving = if plan.only_lobes {
-            all.of_lobes()
+        let Shared { decoder, directions, penalty, hessian, config, .. } = self.shared;
+        let loss = |i, p| local_quadratic(self.loss, i, p);
+        let moving = if let Some(base) = &self.base {
+            QuadraticModel::of_lobes(NormalEquations::of_lobes(&latent.lobes, base, directions, loss))
         } else {
+            let found = decoder.condition(latent)?.normal_equations_with_lobes(directions, loss);
             let (value, by) = penalty.at(&latent.vectors);
-            all.plus(value, &by, hessian)
+            QuadraticModel::new(found, latent.vectors.len(), config.free_exposure).plus(value, &by, hessian)
         };
         Ok(moving.with_small_lobes(latent, SMALL))
     }
 
     /// What each pixel says at the latent.
     fn local(&self, latent: &Latent) -> Result<Vec<LocalQuadratic>> {
-        let Shared { decoder, directions, .. } = self.shared;
-        let mut prediction = vec![[0.0; 3]; directions.len()];
-        decoder.condition(latent)?.log_radiance_batch(directions, &mut prediction);
+        let prediction = self.shared.log_radiance(latent)?;
         Ok(prediction.into_iter().enumerate().map(|(i, p)| local_quadratic(self.loss, i, p)).collect())
+    }
+}
+
+impl Shared<'_> {
+    fn log_radiance(&self, latent: &Latent) -> Result<Vec<[f32; 3]>> {
+        let mut values = vec![[0.0; 3]; self.directions.len()];
+        self.decoder.condition(latent)?.log_radiance_batch(&self.directions, &mut values);
+        Ok(values)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Orthogonal matching pursuit (Pati et al. 1993): lobe after lobe, each the one out of a dictionary that lowers the loss most,
 //! with the best amplitudes of all that were placed. MODEL (83).
 
+use rayon::prelude::*;
 use veni_light::cholesky;
 use veni_light::field::LocalQuadratic;
 use veni_light::latent::Lobe;
@@ -38,7 +39,10 @@ impl Pursuit {
         let lobe =
             |direction| ladder.iter().map(move |s| Lobe { direction, amplitude: [1.0; 3], sharpness: *s });
         let dictionary: Vec<Lobe> = fibonacci_sphere(AXES).into_iter().flat_map(lobe).collect();
-        let values = dictionary.iter().flat_map(|lobe| seen.iter().map(|d| lobe.value(*d)[0])).collect();
+        let mut values = vec![0.0; dictionary.len() * seen.len()];
+        values.par_chunks_exact_mut(seen.len()).zip(&dictionary).for_each(|(row, lobe)| {
+            row.iter_mut().zip(&seen).for_each(|(value, d)| *value = lobe.value(*d)[0]);
+        });
         Self { stride, dictionary, values, pixels: seen.len() }
     }
 
@@ -47,19 +51,20 @@ impl Pursuit {
         let seen: Vec<&LocalQuadratic> = local.iter().step_by(self.stride).collect();
         let weights: [Vec<f64>; 3] = [0, 1, 2].map(|c| seen.iter().map(|l| f64::from(l.weight[c])).collect());
         let total: f64 = weights.iter().flatten().sum();
+        let squares = self.of_all(|row| products(row, &weights, true));
         let mut chosen = Vec::new();
         let mut amplitudes: Vec<[f64; 3]> = Vec::new();
         for _ in 0..count {
-            // the loss's gradient with respect to log radiance, with what was placed so far
-            let mut slope: [Vec<f64>; 3] =
+            // with what was placed so far
+            let mut gradient: [Vec<f64>; 3] =
                 [0, 1, 2].map(|c| seen.iter().map(|l| f64::from(l.gradient[c])).collect());
             for (k, a) in chosen.iter().zip(&amplitudes) {
-                for (c, slope) in slope.iter_mut().enumerate() {
+                for (c, gradient) in gradient.iter_mut().enumerate() {
                     let added = self.row(*k).iter().zip(&weights[c]).map(|(e, w)| f64::from(*e) * w * a[c]);
-                    slope.iter_mut().zip(added).for_each(|(s, by)| *s += by);
+                    gradient.iter_mut().zip(added).for_each(|(g, by)| *g += by);
                 }
             }
-            let Some(best) = self.best(&slope, &weights, RIDGE * total) else { break };
+            let Some(best) = self.best(&gradient, &squares, RIDGE * total) else { break };
             chosen.push(best);
             amplitudes = self.amplitudes(&chosen, &seen, RIDGE * total);
         }
@@ -71,22 +76,19 @@ impl Pursuit {
         &self.values[k * self.pixels..][..self.pixels]
     }
 
-    /// The lobe that alone lowers the loss most: by Σ_c ½ (eᵀ∇_c)²/(eᵀ diag(w_c) e).
-    fn best(&self, slope: &[Vec<f64>; 3], weights: &[Vec<f64>; 3], ridge: f64) -> Option<usize> {
-        let gain = |k: usize| -> f64 {
-            let row = self.row(k);
-            let each = slope.iter().zip(weights).map(|(slope, weights)| {
-                let (mut along, mut square) = (0.0, ridge);
-                for ((e, s), w) in row.iter().zip(slope).zip(weights) {
-                    let e = f64::from(*e);
-                    along += e * s;
-                    square += e * e * w;
-                }
-                along * along / square
-            });
-            each.sum()
+    /// What `of` says of each row, on all threads.
+    fn of_all<T: Send>(&self, of: impl Fn(&[f32]) -> T + Sync + Send) -> Vec<T> {
+        self.values.par_chunks_exact(self.pixels).map(of).collect()
+    }
+
+    /// The lobe that alone lowers the loss most: by Σ_c ½ (eᵀ∇_c)²/(eᵀ diag(w_c) e), with the loss's gradient ∇ with respect to
+    /// log radiance.
+    fn best(&self, gradient: &[Vec<f64>; 3], squares: &[[f64; 3]], ridge: f64) -> Option<usize> {
+        let along = self.of_all(|row| products(row, gradient, false));
+        let gain = |(along, square): (&[f64; 3], &[f64; 3])| -> f64 {
+            along.iter().zip(square).map(|(along, square)| along * along / (square + ridge)).sum()
         };
-        let gains: Vec<f64> = (0..self.dictionary.len()).map(gain).collect();
+        let gains: Vec<f64> = along.iter().zip(squares).map(gain).collect();
         (0..gains.len()).filter(|k| gains[*k] > 0.0).max_by(|a, b| gains[*a].total_cmp(&gains[*b]))
     }
 
@@ -98,13 +100,13 @@ impl Pursuit {
             let mut matrix = vec![0.0; n * n];
             let mut right = vec![[0.0f64; 1]; n];
             for (p, local) in seen.iter().enumerate() {
-                let (weight, slope) = (f64::from(local.weight[c]), f64::from(local.gradient[c]));
+                let (weight, gradient) = (f64::from(local.weight[c]), f64::from(local.gradient[c]));
                 if weight == 0.0 {
                     continue;
                 }
                 for (i, k) in chosen.iter().enumerate() {
                     let e = f64::from(self.row(*k)[p]);
-                    right[i][0] -= e * slope;
+                    right[i][0] -= e * gradient;
                     for (j, other) in chosen[..=i].iter().enumerate() {
                         matrix[i * n + j] += weight * e * f64::from(self.row(*other)[p]);
                     }
@@ -117,4 +119,25 @@ impl Pursuit {
         }
         out
     }
+}
+
+/// Σ e v of a row's values e with each of three columns v; of their squares, Σ e² v, where they are `squared`.
+fn products(row: &[f32], columns: &[Vec<f64>; 3], squared: bool) -> [f64; 3] {
+    /// Sums that run side by side, so that they fill vectors.
+    const LANES: usize = 16;
+    pulp::Arch::new().dispatch(|| {
+        let (rows, rest) = row.as_chunks::<LANES>();
+        let power = |e: f32| f64::from(if squared { e * e } else { e });
+        [0, 1, 2].map(|c| {
+            let (column, beyond) = columns[c].as_chunks::<LANES>();
+            let mut sums = [0.0; LANES];
+            for (row, column) in rows.iter().zip(column) {
+                for ((sum, e), v) in sums.iter_mut().zip(row).zip(column) {
+                    *sum += power(*e) * v;
+                }
+            }
+            let rest: f64 = rest.iter().zip(beyond).map(|(e, v)| power(*e) * v).sum();
+            sums.iter().sum::<f64>() + rest
+        })
+    })
 }

@@ -12,6 +12,7 @@
 mod backward;
 mod chain;
 mod jacobian;
+mod lobe_equations;
 mod lobes;
 mod moments;
 mod normal;

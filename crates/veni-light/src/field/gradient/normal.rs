@@ -103,11 +103,11 @@ impl Field {
 }
 
 impl NormalEquations {
-    fn zero(unknowns: usize) -> Self {
+    pub(super) fn zero(unknowns: usize) -> Self {
         Self { loss: 0.0, gradient: vec![0.0; unknowns], matrix: vec![0.0; unknowns * unknowns] }
     }
 
-    fn add(&mut self, other: &Self) {
+    pub(super) fn add(&mut self, other: &Self) {
         self.loss += other.loss;
         let pairs = self.gradient.iter_mut().zip(&other.gradient);
         for (sum, value) in pairs.chain(self.matrix.iter_mut().zip(&other.matrix)) {
@@ -117,7 +117,7 @@ impl NormalEquations {
 }
 
 /// A loss by direction and log radiance.
-type QuadraticLoss<'a> = dyn Fn(usize, [f32; 3]) -> LocalQuadratic + Sync + 'a;
+pub(super) type QuadraticLoss<'a> = dyn Fn(usize, [f32; 3]) -> LocalQuadratic + Sync + 'a;
 
 /// Work for one thread: any number of directions.
 struct Normal<'a> {

@@ -200,6 +200,31 @@ fn lobes_are_unknowns_too() {
 }
 
 #[test]
+fn lobes_alone_have_the_rows_that_they_have_beside_a_latent() {
+    let (n, directions) = (3, directions(131));
+    let (model, latent) = (odd(n, 16, VnReluForm::Projection), Latent { lobes: lobes(), ..at(3) });
+    let decoder = model.decoder().unwrap();
+    let of = |latent: &Latent| decoder.condition(latent).unwrap();
+    let mut base = vec![[0.0; 3]; directions.len()];
+    of(&Latent { lobes: Vec::new(), ..latent.clone() }).log_radiance_batch(&directions, &mut base);
+    let all = of(&latent).normal_equations_with_lobes(&directions, loss);
+    let (unknowns, first) = (all.gradient.len(), 3 * n + 1);
+    let block: Vec<f64> =
+        all.matrix.chunks_exact(unknowns).skip(first).flat_map(|row| &row[first..]).copied().collect();
+    let alone = |lobes: &[Lobe]| NormalEquations::of_lobes(lobes, &base, &directions, loss);
+    let found = alone(&latent.lobes);
+    assert!((found.loss / all.loss - 1.0).abs() < 1e-5, "{} for {}", found.loss, all.loss);
+    assert!(apart(&found.gradient, &all.gradient[first..]) < 1e-5);
+    assert!(apart(&found.matrix, &block) < 1e-5);
+    // red and green taken for each other
+    let mut other = latent.lobes.clone();
+    other[0].amplitude.swap(0, 1);
+    assert!(apart(&alone(&other).matrix, &block) > 1e-3);
+    let none = alone(&[]);
+    assert!(none.gradient.is_empty() && none.matrix.is_empty() && none.loss > 0.0);
+}
+
+#[test]
 fn a_moved_lobe_stays_on_the_sphere_and_rotates_with_its_tangents() {
     for lobe in lobes() {
         let by = [0.1, -0.2, 0.3, 0.4, 0.05, -0.1];
