@@ -96,7 +96,7 @@ fn illuminance_is_that_of_the_latent_s_light() {
         [("seen.json", &[sky.as_str()][..]), ("alone.json", &[]), ("sh.json", &["--target-sh", "x.json"])]
     {
         let lux = if out == "sh.json" { "300" } else { "20000" };
-        let how = ["--illuminance", lux, "--resolution", "64", "--steps", "12", "-o", out, "-q"];
+        let how = ["--illuminance", lux, "--resolution", "64", "--steps", "3", "-o", out, "-q"];
         dir.ok(&[&["fit"], what, &how].concat());
     }
     // light takes what is compact for discs and sums the rest coarsely: half a percent

@@ -41,11 +41,22 @@ fn the_allowance_for_fits_is_what_last_bits_cost() {
         }
         let case = Case::load(&path).unwrap_or_else(|e| panic!("{e}"));
         let plain = crate::fit::coordinates(&evaluate(&case, &device));
-        let moved = |seed| {
-            let other = with_other_last_bits(&case, seed, 1);
-            largest(&plain, &crate::fit::coordinates(&evaluate(&other, &device)))
+        // a fit uses one processor, and a case counts what is read of it
+        let moved = |seeds: &[u64]| {
+            let (case, device) = (Case::load(&path).unwrap(), Device::flex().autodiff());
+            let moved = |seed: &u64| {
+                let other = with_other_last_bits(&case, *seed, 1);
+                largest(&plain, &crate::fit::coordinates(&evaluate(&other, &device)))
+            };
+            seeds.iter().map(moved).fold(0.0, f64::max)
         };
-        let moved = (1..=DRAWS).map(moved).fold(0.0, f64::max);
+        let seeds: Vec<u64> = (1..=DRAWS).collect();
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let moved = std::thread::scope(|scope| {
+            let parts = seeds.chunks(seeds.len().div_ceil(threads));
+            let parts: Vec<_> = parts.map(|part| scope.spawn(|| moved(part))).collect();
+            parts.into_iter().map(|part| part.join().unwrap()).fold(0.0, f64::max)
+        });
         let off = largest(&plain, &case.data("out.eval_mu20").values);
         allowed = allowed.max(allowance(&case));
         most_moved = most_moved.max(moved);

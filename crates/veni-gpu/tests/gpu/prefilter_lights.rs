@@ -60,6 +60,10 @@ fn levels_have_lights_of_every_width() {
     let latents = decoder.condition_batch(queue, &skies).unwrap();
     let harmonics = gpu.analyse(&prefilter, &decoder, &skies);
     let levels = Levels::new(size, count, Law::Quadratic);
+    let field = model.decoder().unwrap().condition(&lit(4).rotated(turn)).unwrap();
+    let pixels = field.without_lights().bake(FINE);
+    let rest = Prefilter::new(EnvironmentMap::new(FINE, &pixels).unwrap(), &[levels]);
+    let cpu = rest.clone().with_lights(field.lights());
     for frame in [Frame::Blender, Frame::Bevy] {
         let [chain, dark] = [true, false].map(|lights| {
             let chain = gpu.chain(TextureFormat::Rgba32Float, size as u32, count as u32, 2);
@@ -70,11 +74,6 @@ fn levels_have_lights_of_every_width() {
             queue.submit([encoder.finish()]);
             chain
         });
-        let field = model.decoder().unwrap().condition(&lit(4).rotated(turn)).unwrap();
-        let pixels = field.without_lights().bake(FINE);
-        let cpu = Prefilter::new(EnvironmentMap::new(FINE, &pixels).unwrap(), &[levels]);
-        let rest = cpu.clone();
-        let cpu = cpu.with_lights(field.lights());
         for level in 0..count {
             let (p, texels) = (levels.roughness(level), 6 * levels.size(level).pow(2));
             // the second latent's
