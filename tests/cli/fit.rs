@@ -86,7 +86,7 @@ fn every_preset_and_objective_lowers_its_loss_and_seeds_name_starts() {
         let adam = loss_after("30", &["--preset", preset, "--method", "adam"]);
         assert!(marquardt <= 1.02 * adam, "{preset}: {marquardt} and {adam} by adam");
     }
-    let lit = |share: &str| loss(&["--preset", "energy", "--share", share]);
+    let lit = |share: &str| loss(&["--preset", "energy", "--energy-weight", share]);
     assert!(lit("0.05") == loss(&["--objective", "energy"]) && lit("0.05") != lit("0.2"));
     // without its share the energy's weights are 1, to the rounding of the products
     let (none, plain) = (lit("0"), loss(&[]));
@@ -221,8 +221,9 @@ fn what_cannot_be_fitted_is_refused_before_any_work() {
     refused(&[&sky, "-o", "a.json", "--uncertainty", "u.exr", "--steps", "1"], &["--starts"]);
     refused(&[&sky, "-o", "a.json", "--completed", "c.exr", "--size", "8x8"], &["--size 8x8"]);
     refused(&[&sky, "--prior=-1"], &["prior = -1"]);
-    refused(&[&sky, "--share", "0.1"], &["--share", "--preset energy"]);
-    refused(&[&sky, "--preset", "energy", "--share", "2"], &["weight = 2", "0..=1"]);
+    // by its earlier name too
+    refused(&[&sky, "--share", "0.1"], &["--energy-weight", "--preset energy"]);
+    refused(&[&sky, "--preset", "energy", "--energy-weight", "2"], &["weight = 2", "0..=1"]);
     refused(&[&sky, "--resolution", "32x32"], &["--resolution"]);
     let marquardt = ["--method", "levenberg-marquardt"];
     refused(&[&[sky.as_str(), "--rate", "0.1"][..], &marquardt].concat(), &["--rate", "adam"]);

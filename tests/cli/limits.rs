@@ -190,7 +190,7 @@ fn watched(dir: &Dir, args: &[&str]) -> (Option<i32>, u64) {
 }
 
 /// With little memory, several large files are read one after the other; one that is too large is refused by name, and the
-/// rest is done. Without the learning world only: its allocator reserves address space far beyond what it uses.
+/// rest is done. Without burn only: its allocator reserves address space far beyond what it uses.
 #[cfg(all(target_os = "linux", not(feature = "learn")))]
 #[test]
 fn large_files_take_turns_and_a_larger_one_is_refused() {

@@ -1,6 +1,6 @@
 //! Whole-system tests: the real binary, in a fresh folder each time, on real panoramas.
 //!
-//! Most need the learning world. What does not also runs alone: `cargo test -p veni-cli --no-default-features --test cli`.
+//! Most need burn. What does not also runs alone: `cargo test -p veni-cli --no-default-features --test cli`.
 
 #[cfg(feature = "pretrained")]
 mod asked;
@@ -58,7 +58,7 @@ mod pipes;
 mod prepare;
 #[cfg(feature = "pretrained")]
 mod promises;
-#[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without the learning world"))]
+#[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without burn"))]
 mod readers;
 #[cfg(feature = "pretrained-large")]
 mod remembered;
@@ -76,7 +76,7 @@ mod terminal;
 mod train_devices;
 #[cfg(feature = "learn")]
 mod training;
-#[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without the learning world"))]
+#[cfg_attr(not(feature = "learn"), allow(dead_code, reason = "few tests run without burn"))]
 mod util;
 #[cfg(feature = "pretrained")]
 mod writers;

@@ -1,4 +1,4 @@
-//! The learning world: what encoding a panorama, decoding it and learning from it cost.
+//! What encoding a panorama, decoding it and learning from it cost.
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
 use burn::tensor::{Device, Tensor, TensorData};

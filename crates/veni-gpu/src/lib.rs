@@ -15,7 +15,7 @@
 //! [`shader`] has no wgpu types: WGSL text, sizes, binding layouts and packed weights for any API, and the function
 //! `veni_radiance` to paste into a path tracer. It is all that is left without the feature `wgpu`.
 //!
-//! This crate belongs to the lighting world: it must not depend on burn (checked by `scripts/check-worlds.sh`).
+//! This crate must not depend on burn (checked by `scripts/check-worlds.sh`).
 
 #![forbid(unsafe_code)]
 

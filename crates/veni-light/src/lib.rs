@@ -20,7 +20,8 @@
 //!
 //! | term | meaning | symbol, unit |
 //! |---|---|---|
-//! | latent | the code of a panorama: N vectors in R³ that rotate with the scene, and a log exposure | Z ∈ R^{N×3} |
+//! | latent | what stands for a panorama: N vectors in R³ that rotate with the scene, and a log exposure | Z ∈ R^{N×3} |
+//! | code | latent with the compact lights and lobes that were measured beside its vectors | D = 3N + 7M + 7K numbers |
 //! | latent dimension | number of coordinates of the vectors; names a model (`--model 27`) | D = 3N |
 //! | conditioning | what the decoder is given of the latent besides its products with the direction: rotation invariants of its vectors (condition features) | a |
 //! | field | the decoder conditioned on one latent: direction to radiance | f(d; Z) |

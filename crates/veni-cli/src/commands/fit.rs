@@ -45,9 +45,9 @@ use settings::{Settings, Start};
 #[command(
     long_about = "Find the latent of a panorama, a part of one, a photograph, the light on a surface, or harmonics of \
         light, by optimisation.\n\n\
-        A panorama is OpenEXR, Radiance, PNG or JPEG, twice as wide as high, z up. Pixels that are not a number, \
+        A panorama is OpenEXR, Radiance, PNG, JPEG or WebP, twice as wide as high, z up. Pixels that are not a number, \
         transparent, or black in --mask are unknown, and the latent completes them. With --fov the picture is a \
-        photograph taken in the direction of --look. Values that a PNG or JPEG has clipped count as \"at least this \
+        photograph taken in the direction of --look. Values that a picture of limited range has clipped count as \"at least this \
         bright\". When part of the sphere is unknown, several starts are tried, the best is kept, and where they \
         disagree the completion is uncertain.\n\n\
         With --normals the picture shows a surface of known shape and material, whole or where --mask is white, and \

@@ -1,7 +1,7 @@
 //! The model: its configuration and its weight file, the bridge between training and use.
 //!
 //! The file is safetensors. Tensors are f32 or f16, named by dotted path: `decoder.*` (exactly
-//! [`decoder_schema`]), `encoder.*` (optional; checked by the learning world, carried as it is here) and
+//! [`decoder_schema`]), `encoder.*` (optional; checked by veni-core, carried as it is here) and
 //! `prior.*` (optional; see [`Model::prior`]). The header entry `veni` is JSON: `format`, `kind`, `config`
 //! ([`ModelConfig`]), `frame` (always `z-up`) and provenance ([`ModelInfo`]).
 //!

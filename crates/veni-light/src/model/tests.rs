@@ -22,7 +22,7 @@ fn small() -> Model {
     model
 }
 
-/// `small` with an encoder that only the learning world could check.
+/// `small` with an encoder that only veni-core could check.
 fn with_encoder() -> Model {
     let model = small();
     let config = ModelConfig { encoder: Some(EncoderConfig::default()), ..model.config().clone() };

@@ -34,14 +34,14 @@ pub(super) struct Integrals {
         Condon-Shortley sign)"
     )]
     #[arg(long, value_name = "FILE", conflicts_with_all = ["pictures", "mask", "fov", "normals", "layer", "preset",
-        "objective", "share", "exposure"])]
+        "objective", "energy_weight", "exposure"])]
     target_sh: Option<PathBuf>,
 
     #[arg(help = "Instead of a picture, or beside --target-sh: what surfaces receive (JSON: a list of \
         {\"normal\":[x,y,z],\"irradiance\":[r,g,b]} or {\"normal\":[x,y,z],\"illuminance\":y}, or what 'veni-cli light -o' \
         writes)")]
     #[arg(long, value_name = "FILE", conflicts_with_all = ["pictures", "mask", "fov", "normals", "layer", "preset",
-        "objective", "share", "exposure"])]
+        "objective", "energy_weight", "exposure"])]
     target_irradiance: Option<PathBuf>,
 
     /// Scale what is found so that a level surface receives this many lux, radiance being in cd/m²; alone, it is a

@@ -17,7 +17,7 @@ const LIGHT_PRIOR: f64 = 1e-4;
 #[derive(Args, Debug)]
 pub(super) struct Settings {
     /// What the following options start from [default: energy with --lobes, and for whole panoramas with models that were trained
-    /// without the lights of theirs; else thorough]
+    /// without the lights of their panoramas; else thorough]
     #[arg(long, value_enum)]
     preset: Option<Preset>,
 
@@ -40,8 +40,8 @@ pub(super) struct Settings {
     /// Energy weight of the objective energy, the part of the weight that goes by light, 0 to 1: the more, the better
     /// suns and lamps and the worse everything else [default: 0.35 with --lobes and for models that were trained without the lights of their
     /// panoramas, else 0.05]
-    #[arg(long, value_name = "PART")]
-    share: Option<f64>,
+    #[arg(long, value_name = "PART", alias = "share")]
+    energy_weight: Option<f64>,
 
     /// Weight of the model's prior over latents; 0 turns it off [default: 0.0001, 0.00001 for more than 16 vectors,
     /// 0.01 over the known part of the sphere where there is an unknown one, 0.000001 without a picture; with the presets of the papers 0]
@@ -80,7 +80,7 @@ enum Preset {
     /// Log radiance, weighted by solid angle, as far down as it goes
     #[default]
     Thorough,
-    /// The same, weighted partly (--share) by the light that comes from there: the sun stands where it belongs, for light
+    /// The same, weighted partly (--energy-weight) by the light that comes from there: the sun stands where it belongs, for light
     /// that is to illuminate something
     Energy,
     /// What is seen on a screen under the picture's own white; highlights beyond it are left alone
@@ -112,7 +112,7 @@ enum ObjectiveName {
     Absolute,
     /// Squared error of tonemapped values
     Display,
-    /// Squared error of log radiance, by solid angle and (--share) by the light that comes from there
+    /// Squared error of log radiance, by solid angle and (--energy-weight) by the light that comes from there
     Energy,
     /// Squared error of log radiance, every pixel alike
     Reference,
@@ -185,11 +185,11 @@ impl Settings {
                 ObjectiveName::Training => Objective::Terms(LossConfig::default()),
             };
         }
-        match (self.share, &mut config.objective) {
+        match (self.energy_weight, &mut config.objective) {
             (Some(part), Objective::Energy { weight }) => *weight = part,
             (Some(_), _) => {
                 bail!(
-                    "--share: only the objective energy has an energy weight; add --preset energy, or leave it out"
+                    "--energy-weight: only the objective energy has an energy weight; add --preset energy, or leave it out"
                 )
             }
             (None, _) => {}

@@ -20,7 +20,7 @@ pub(super) fn meaning(header: &Header, text: &BTreeMap<String, String>, coloured
         .map(|c| Primaries([c.red, c.green, c.blue, c.white].map(|v| [f64::from(v.0), f64::from(v.1)])));
     let unsaid = Primaries([[0.0; 2]; 4]);
     if chromaticities == Some(unsaid) {
-        meaning.note("chromaticities are all 0, which is no colour space: they are ignored");
+        meaning.note("chromaticities are all 0, which is not a colour space: they are ignored");
     }
     let chromaticities = chromaticities.filter(|stated| *stated != unsaid);
     let mut primaries = chromaticities;

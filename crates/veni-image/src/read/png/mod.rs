@@ -99,13 +99,16 @@ fn colour(tags: &mut Tags, name: &[u8; 4], body: &[u8]) -> Result<()> {
         }
         b"gAMA" => match numbers(body).first() {
             Some(0.0) => {
-                note(tags, "its gAMA chunk says 0, which is no exponent: it is ignored".to_owned());
+                note(tags, "its gAMA chunk says 0, which is not an exponent: it is ignored".to_owned());
             }
             value => tags.gamma = value.map(|v| v / 100_000.0),
         },
         b"cHRM" => match numbers(body)[..] {
             [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] => {
-                note(tags, "its cHRM chunk says 0 throughout, which is no colour: it is ignored".to_owned());
+                note(
+                    tags,
+                    "its cHRM chunk says 0 throughout, which is not a colour: it is ignored".to_owned(),
+                );
             }
             [wx, wy, rx, ry, gx, gy, bx, by] => {
                 let pairs = [[rx, ry], [gx, gy], [bx, by], [wx, wy]];

@@ -37,7 +37,7 @@ fn an_auto_decoder_learns_its_panoramas_and_leaves_its_table() {
     let model = Model::load(out.join("model.safetensors")).unwrap();
     assert!(!model.has_encoder() && model.has_prior());
     assert_eq!(model.config().kind, veni_light::model::ModelKind::Reni);
-    // the paper's network: the lighting world decodes it
+    // the paper's network: the crates without burn decode it
     assert!(model.decoder().unwrap().condition(&Latent::from_seed(&model.prior(), 1)).is_ok());
     let bytes = file(&out, "latents.safetensors");
     let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
