@@ -1,4 +1,4 @@
-//! The CPU decoder with filler weights: `cargo bench -p veni-light --features parallel --bench field`.
+//! The CPU decoder with filler weights: `cargo bench -p veni-light --features gradients --bench field`.
 
 use std::hint::black_box;
 

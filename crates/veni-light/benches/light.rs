@@ -1,4 +1,4 @@
-//! What renderers need of a map, as fast as it is: `cargo bench -p veni-light --features parallel,pretrained --bench light`.
+//! What renderers need of a map, as fast as it is: `cargo bench -p veni-light --features pretrained,prefilter --bench light`.
 
 use std::hint::black_box;
 
