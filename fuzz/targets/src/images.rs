@@ -1,30 +1,25 @@
-//! Image files: panoramas, pictures of limited range, masks, the attributes of headers.
+//! Image files: panoramas, masks, the attributes of headers.
 
 use std::io::Cursor;
 use std::path::Path;
 
-use image::{ImageFormat, Rgb, RgbImage, Rgba, RgbaImage};
 use veni_image::{
-    HalfRange, LdrPanorama, Panorama, Picture, Precision, ReadOptions, WriteFormat, WriteOptions, attributes,
-    peak_bytes, read_mask,
+    HalfRange, Panorama, Picture, Precision, ReadOptions, WriteFormat, WriteOptions, attributes, peak_bytes,
+    read_mask,
 };
 use veni_light::sphere::Equirect;
 
+use super::pictures::{checksums, jpeg, png};
 use super::{PIXELS, Target, untouched};
 
 pub(super) const TARGETS: &[Target] = &[
     Target { name: "exr", run: panorama, seeds: exr, repair: untouched },
     Target { name: "hdr", run: panorama, seeds: hdr, repair: untouched },
     Target { name: "attributes", run: header, seeds: headers, repair: untouched },
-    Target { name: "png", run: ldr, seeds: png, repair: checksums },
-    Target { name: "jpeg", run: ldr, seeds: jpeg, repair: untouched },
-    Target { name: "webp", run: ldr, seeds: webp, repair: untouched },
-    #[cfg(feature = "avif")]
-    Target { name: "avif", run: ldr, seeds: avif, repair: untouched },
     Target { name: "mask", run: mask, seeds: masks, repair: checksums },
 ];
 
-fn options() -> ReadOptions {
+pub(super) fn options() -> ReadOptions {
     ReadOptions { max_pixels: PIXELS, any_aspect: true, ..ReadOptions::default() }
 }
 
@@ -38,14 +33,6 @@ fn panorama(path: &Path) -> bool {
 
 fn header(path: &Path) -> bool {
     attributes(path).is_ok() && peak_bytes(path, &options()).is_ok_and(|bytes| bytes.is_some())
-}
-
-fn ldr(path: &Path) -> bool {
-    let Ok(found) = LdrPanorama::read_with(path, &options()) else { return false };
-    let linear = found.linear(veni_image::Transfer::Srgb);
-    // colours of wider primaries are outside of 0 to 1
-    assert!(linear.pixels().as_flattened().iter().all(|v| v.is_finite()), "display values");
-    true
 }
 
 /// What the declared size allows: masks and pictures have no limit of their own.
@@ -115,89 +102,6 @@ fn headers() -> Vec<Vec<u8>> {
     [exr(), hdr()].concat()
 }
 
-fn encoded(format: ImageFormat, alpha: bool) -> Vec<u8> {
-    let mut out = Cursor::new(Vec::new());
-    let done = if alpha {
-        let at = |x: u32, y: u32| Rgba([(8 * x) as u8, (16 * y) as u8, 77, (255 - 5 * x) as u8]);
-        RgbaImage::from_fn(32, 16, at).write_to(&mut out, format)
-    } else {
-        RgbImage::from_fn(32, 16, |x, y| Rgb([(8 * x) as u8, (16 * y) as u8, 77])).write_to(&mut out, format)
-    };
-    done.expect("a seed can be encoded");
-    out.into_inner()
-}
-
-fn png() -> Vec<Vec<u8>> {
-    let mut all = vec![encoded(ImageFormat::Png, false), encoded(ImageFormat::Png, true)];
-    let chunk =
-        |name: &[u8; 4], body: &[u8]| [&(body.len() as u32).to_be_bytes()[..], name, body, &[0; 4]].concat();
-    // a palette of two colours: one row of 16 pixels, stored without compression
-    let header = [0, 0, 0, 16, 0, 0, 0, 1, 1, 3, 0, 0, 0];
-    let data = [0x78, 1, 1, 3, 0, 0xFC, 0xFF, 0, 0x55, 0x0F, 0, 0xB9, 0, 0x65];
-    let mut indexed = [
-        &b"\x89PNG\r\n\x1a\n"[..],
-        &chunk(b"IHDR", &header),
-        &chunk(b"gAMA", &[0, 0, 0xB1, 0x8F]),
-        &chunk(b"PLTE", &[0, 0, 0, 255, 128, 64]),
-        &chunk(b"tRNS", &[255, 128]),
-        &chunk(b"eXIf", b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"),
-        &chunk(b"IDAT", &data),
-        &chunk(b"IEND", &[]),
-    ]
-    .concat();
-    checksums(&mut indexed);
-    all.push(indexed);
-    all
-}
-
-fn jpeg() -> Vec<Vec<u8>> {
-    let plain = encoded(ImageFormat::Jpeg, false);
-    let exif = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
-    let mut turned = plain[..2].to_vec();
-    turned.extend([0xFF, 0xE1]);
-    turned.extend((exif.len() as u16 + 2).to_be_bytes());
-    turned.extend(exif);
-    turned.extend(&plain[2..]);
-    vec![plain, turned]
-}
-
-fn webp() -> Vec<Vec<u8>> {
-    vec![encoded(ImageFormat::WebP, false), encoded(ImageFormat::WebP, true)]
-}
-
-#[cfg(feature = "avif")]
-fn avif() -> Vec<Vec<u8>> {
-    vec![
-        include_bytes!("../../../crates/veni-image/src/read/avif/files/8-bit-420-bt601-limited.avif")
-            .to_vec(),
-        include_bytes!("../../../crates/veni-image/src/read/avif/files/8-bit-alpha.avif").to_vec(),
-        include_bytes!("../../../crates/veni-image/src/read/avif/files/10-bit-444-bt2020.avif").to_vec(),
-    ]
-}
-
 fn masks() -> Vec<Vec<u8>> {
     [png(), exr(), jpeg()].concat()
-}
-
-/// The checksums of a PNG's chunks.
-fn checksums(file: &mut [u8]) {
-    let mut at = 8;
-    while let Some(length) =
-        file.get(at..at + 4).and_then(|b| b.first_chunk()).map(|b| u32::from_be_bytes(*b))
-    {
-        let end = at + 8 + length as usize;
-        if !file.starts_with(b"\x89PNG") || end + 4 > file.len() {
-            return;
-        }
-        let sum = crc(&file[at + 4..end]);
-        file[end..end + 4].copy_from_slice(&sum.to_be_bytes());
-        at = end + 4;
-    }
-}
-
-/// CRC-32 (ISO 3309), bit by bit.
-fn crc(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(u32::MAX, |sum, byte| {
-        (0..8).fold(sum ^ u32::from(*byte), |sum, _| (sum >> 1) ^ ((sum & 1) * 0xEDB8_8320))
-    })
 }

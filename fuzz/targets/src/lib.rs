@@ -11,6 +11,7 @@ pub mod mutate;
 #[cfg(feature = "onnx")]
 mod network;
 mod obj;
+mod pictures;
 #[cfg(feature = "learn")]
 mod runs;
 
@@ -36,6 +37,7 @@ pub struct Target {
 /// All targets that the features of this build have.
 pub fn targets() -> Vec<Target> {
     let mut all = images::TARGETS.to_vec();
+    all.extend(pictures::TARGETS);
     all.extend(light::TARGETS);
     all.extend(obj::TARGETS);
     #[cfg(feature = "onnx")]
