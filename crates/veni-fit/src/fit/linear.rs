@@ -43,7 +43,8 @@ pub fn fit_linear(
 }
 
 /// [`fit_linear`] several times on end, under a prior whose weight falls to [`FitConfig::prior`]: of the latents with these
-/// integrals a likely one. Makes [`FitConfig::steps`] updates under each weight, at most.
+/// integrals a likely one. Makes [`FitConfig::steps`] updates under each weight, at most; all but those under the last at half the
+/// resolution.
 ///
 /// # Errors
 /// As [`fit_linear`].
@@ -56,7 +57,9 @@ pub fn likely_linear(
     observer: &mut dyn FnMut(u64, f64),
 ) -> Result<FitResult> {
     let mut all = FitResult { latents: start.to_vec(), losses: Vec::new(), last: Vec::new() };
+    let coarse = target.coarser();
     for factor in FALL {
+        let target = coarse.as_ref().filter(|_| factor > 1.0).unwrap_or(target);
         let config = FitConfig { prior: factor * config.prior, ..*config };
         let before = all.losses.len() as u64;
         let mut observer = |step, loss| observer(before + step, loss);

@@ -11,6 +11,9 @@ use crate::{Error, Result};
 /// The unit of a target is free, but single precision is not: magnitudes beyond 10^±20 are refused.
 const RANGE: std::ops::RangeInclusive<f64> = 1e-20..=1e20;
 
+/// Rows that show a light well enough for a search to begin.
+const COARSEST: usize = 32;
+
 /// Integrals of light that a latent is to have, each a weighted sum of radiance over the pixels of a grid.
 ///
 /// Directions are of the native frame, radiance is linear Rec. 709 in any unit: the latent's log exposure takes it on.
@@ -182,6 +185,23 @@ impl LinearTarget {
     /// Where the light is decoded.
     pub fn grid(&self) -> Equirect {
         self.grid
+    }
+
+    /// The same wanted of a light that is decoded at half the width and half the height: pixels stand for those that they cover.
+    /// None of an odd number of columns or rows, or of few.
+    pub(crate) fn coarser(&self) -> Option<Self> {
+        let Equirect { width, height } = self.grid;
+        if width % 2 + height % 2 != 0 || height <= COARSEST {
+            return None;
+        }
+        let grid = Equirect::new(width / 2, height / 2);
+        let mut weights = vec![0.0; grid.len() * self.count];
+        for (pixel, own) in self.weights.chunks_exact(self.count.max(1)).enumerate() {
+            let at = pixel / width / 2 * grid.width + pixel % width / 2;
+            let sums = &mut weights[at * self.count..][..self.count];
+            sums.iter_mut().zip(own).for_each(|(sum, w)| *sum += w);
+        }
+        Some(Self { grid, weights, terms: self.terms.clone(), ..*self })
     }
 
     /// Whether nothing is wanted.

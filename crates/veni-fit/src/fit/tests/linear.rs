@@ -113,6 +113,28 @@ fn the_gradient_is_that_of_light_s_own_pull_backs() {
 }
 
 #[test]
+fn at_half_the_resolution_the_same_is_wanted() {
+    let grid = Equirect::new(128, 64);
+    let wanted = Sh::<2>::of_field(&decoder().condition(&lit(2)).unwrap(), grid);
+    let surfaces = WAYS.map(|way| (way, Received::Illuminance(2.0)));
+    let fine = LinearTarget::new(grid).harmonics(wanted.coefficients()).unwrap().surfaces(&surfaces).unwrap();
+    let coarse = fine.coarser().unwrap();
+    let of = |target: &LinearTarget, light: &Latent| {
+        let mut values = vec![[0.0; 3]; target.grid().len()];
+        decoder().condition(light).unwrap().log_radiance_batch(&target.grid().directions(), &mut values);
+        target.achieved(values.as_flattened())
+    };
+    assert_eq!(coarse.grid(), Equirect::new(64, 32));
+    let (a, b) = (of(&fine, &lit(2)), of(&coarse, &lit(2)));
+    assert!(a.harmonics_error.unwrap() < 1e-4 && b.harmonics_error.unwrap() < 0.02, "{a:?} {b:?}");
+    for (a, b) in a.surfaces.iter().flatten().zip(b.surfaces.iter().flatten()) {
+        assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
+    }
+    assert!(of(&coarse, &lit(3)).harmonics_error.unwrap() > 0.2);
+    assert!(LinearTarget::new(Equirect::new(64, 32)).coarser().is_none());
+}
+
+#[test]
 fn a_light_is_found_again_by_its_integrals_with_either_method() {
     // of a trained decoder: the light of one with weights from a formula has a minimum at every turn
     let model = Model::pretrained();
