@@ -2,7 +2,7 @@
 //!
 //! | here | crate | feature |
 //! |---|---|---|
-//! | [`sphere`], [`latent`], [`model`], [`field`], [`light`] | veni-light: what a renderer embeds | |
+//! | [`sphere`], [`latent`], [`model`], [`field`], [`light`], [`skies`] | veni-light: what a renderer embeds | |
 //! | `gpu` | veni-gpu: the decoder as WGSL compute | `gpu` |
 //! | `nn`, `vae`, `train`, `fit`, `data`, `panorama`, `synth` | veni-core and what stands below it | `learn` |
 //! | `eval` | veni-eval: protocols, baselines | `learn` |
@@ -17,6 +17,15 @@ pub use veni_eval as eval;
 pub use veni_gpu as gpu;
 #[cfg(not(feature = "learn"))]
 pub use veni_light::*;
+
+/// Modules of veni-light are in every build, with `learn` and without; where one is not, this does not compile.
+#[allow(unused_imports, reason = "it is asked whether the names exist")]
+mod in_every_build {
+    use crate::{
+        cholesky, digest, error, field, latent, light, limits, model, output, progress, random, skies,
+        sphere, text,
+    };
+}
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

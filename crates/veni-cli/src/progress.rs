@@ -20,6 +20,8 @@ pub(crate) struct ProgressBars {
 struct Work {
     bar: Bar,
     what: String,
+    /// What is said beside units that are only counted.
+    message: String,
     done: u64,
 }
 
@@ -37,8 +39,8 @@ impl ProgressBars {
     pub(crate) fn begin_after(&self, done: u64, what: &str, unit: &str, total: Option<u64>) {
         let mut current = self.current();
         end(&mut current);
-        *current =
-            Some(Work { bar: Bar::start(self.report, unit, done, total), what: what.to_owned(), done });
+        let bar = Bar::start(self.report, unit, done, total);
+        *current = Some(Work { bar, what: what.to_owned(), message: String::new(), done });
     }
 
     /// `done` units are done in all.
@@ -51,7 +53,17 @@ impl ProgressBars {
     /// This many more units are done.
     pub(crate) fn add(&self, units: u64) {
         if let Some(work) = self.current().as_mut() {
-            work.advance(work.done + units, "");
+            let message = std::mem::take(&mut work.message);
+            work.advance(work.done + units, &message);
+            work.message = message;
+        }
+    }
+
+    /// What stands beside the units that are counted from here on.
+    #[cfg(feature = "learn")]
+    pub(crate) fn describe(&self, message: String) {
+        if let Some(work) = self.current().as_mut() {
+            work.message = message;
         }
     }
 

@@ -5,7 +5,7 @@
 //!
 //! | here | crate | what |
 //! |---|---|---|
-//! | [`sphere`], [`latent`], [`model`], [`field`] | veni-light | what a renderer embeds |
+//! | [`sphere`], [`latent`], [`model`], [`field`], [`light`], [`skies`] | veni-light | what a renderer embeds |
 //! | [`panorama`] | veni-image | panoramas in and out, colour, tone mapping, metrics |
 //! | [`synth`] | veni-synth | generated scenes |
 //! | [`fit`], [`shade`] | veni-fit | encoder in plain f32, latent optimisation, rendered surfaces |
@@ -27,5 +27,8 @@ pub use loaded::{LoadedModel, Rest};
 pub use veni_data::{self as data, expand, prepare};
 pub use veni_fit::shade;
 pub use veni_image as panorama;
-pub use veni_light::{Error, Result, error, field, latent, light, model, output, progress, random, sphere};
+pub use veni_light::{
+    Error, Result, cholesky, digest, error, field, latent, light, model, output, progress, random, skies,
+    sphere, text,
+};
 pub use veni_synth as synth;

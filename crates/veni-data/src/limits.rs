@@ -1,8 +1,6 @@
 //! Limits of what is read, each with its reason. They are checked before anything of the size in question is allocated.
 #![cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "networks are read with the feature onnx"))]
 
-use crate::{Error, Result};
-
 /// Bytes of an ONNX file: Protocol Buffers, and so ONNX files, are no larger.
 pub const MAX_ONNX_BYTES: u64 = 1 << 31;
 
@@ -27,11 +25,3 @@ pub const MAX_ONNX_PIXELS: u64 = 1 << 25;
 /// Seconds that the runtime may take to load a network, whose weights it packs and whose constant parts it computes: the
 /// largest take some ten.
 pub const MAX_ONNX_SECONDS: u64 = 120;
-
-/// Refuses `value` beyond `limit`; `what` names it with its unit.
-pub(crate) fn at_most(what: &str, value: u64, limit: u64) -> Result<()> {
-    if value <= limit {
-        return Ok(());
-    }
-    Err(Error::beyond(format!("{value} {what} is more than the limit of {limit}"), value, limit))
-}

@@ -6,6 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use veni_core::progress::Observer;
 use veni_core::train::presets::Preset;
 use veni_core::train::progress::{Progress, StepReport, ValidationReport};
 use veni_core::train::run::Trainer;
@@ -17,12 +18,16 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 struct Print;
 
-impl Progress for Print {
-    fn start(&mut self, done: u64, total: u64) {
-        println!("updates {done} of {total}");
+impl Observer for Print {
+    fn begin(&self, unit: &'static str, task: &str, done: usize, total: usize) {
+        println!("{task}: {unit} {done} of {total}");
     }
 
-    fn step(&mut self, report: &StepReport, remaining: f64) {
+    fn advance(&self, _: usize) {}
+}
+
+impl Progress for Print {
+    fn step(&self, report: &StepReport, remaining: f64) {
         if report.step.is_multiple_of(25) || report.step <= 5 {
             let parts: Vec<_> =
                 report.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
@@ -35,11 +40,11 @@ impl Progress for Print {
         }
     }
 
-    fn validation(&mut self, report: &ValidationReport) {
+    fn validation(&self, report: &ValidationReport) {
         println!("validation {}", serde_json::to_string(report).unwrap_or_default());
     }
 
-    fn wrote(&mut self, path: &Path) {
+    fn wrote(&self, path: &Path) {
         println!("wrote {}", path.display());
     }
 }
@@ -61,7 +66,7 @@ fn main() -> Result<()> {
         }
         _ => return Err(usage()),
     };
-    let finish = trainer.run(&AtomicBool::new(false), &mut Print)?;
+    let finish = trainer.run(&AtomicBool::new(false), &Print)?;
     println!("{finish:?}");
     Ok(())
 }

@@ -54,7 +54,7 @@ impl Train {
         let stop =
             interrupt::handle("stopping after this step and writing a checkpoint (again: end at once)");
         let progress = ProgressBars::new(report);
-        let finish = trainer.run(stop, &mut &progress).map_err(with_remedy)?;
+        let finish = trainer.run(stop, &progress).map_err(with_remedy)?;
         progress.end();
         let (done, total) = (trainer.steps_done(), trainer.config().steps);
         let best = run::best(&self.out)?;

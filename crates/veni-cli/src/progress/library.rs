@@ -29,23 +29,15 @@ impl Observer for ProgressBars {
 }
 
 #[cfg(feature = "learn")]
-impl Progress for &ProgressBars {
-    fn start(&mut self, done: u64, total: u64) {
-        self.begin_after(done, "", "step", Some(total));
-    }
-
-    fn step(&mut self, step: &StepReport, _remaining: f64) {
+impl Progress for ProgressBars {
+    fn step(&self, step: &StepReport, _remaining: f64) {
         crate::interrupt::heard();
         let parts: Vec<_> = step.parts.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
         let stage = step.stage.as_ref().map(|stage| format!("{stage}, ")).unwrap_or_default();
-        ProgressBars::advance(
-            self,
-            step.step,
-            &format!("{stage}loss {:.4} ({})", step.loss, parts.join(", ")),
-        );
+        self.describe(format!("{stage}loss {:.4} ({})", step.loss, parts.join(", ")));
     }
 
-    fn validation(&mut self, report: &ValidationReport) {
+    fn validation(&self, report: &ValidationReport) {
         crate::interrupt::heard();
         let psnr = |name, scores: &Option<_>| {
             scores.as_ref().map(|s: &Scores| format!("{name} {:.2} dB", s.ldr_psnr))

@@ -1,10 +1,11 @@
-//! What a training run reports to its observer. The library prints nothing.
+//! What a training run reports to its observer, beside how far it has come. The library prints nothing.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use veni_image::metrics::Scores;
+use veni_light::progress::Observer;
 
 /// One update, as written to `metrics.jsonl` and shown to the user.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -41,25 +42,21 @@ pub struct ValidationReport {
     pub best: bool,
 }
 
-/// Receives reports. Every method does nothing unless it is written.
-pub trait Progress {
-    /// The run begins, or continues after `done` of `total` updates.
-    fn start(&mut self, done: u64, total: u64) {
-        let _ = (done, total);
-    }
-
-    /// An update has been made; `remaining` is the estimated time to the last one, in seconds.
-    fn step(&mut self, report: &StepReport, remaining: f64) {
+/// An observer of a run, whose updates it counts as units of one task, and who is told what came of them. Every method of its own
+/// does nothing unless it is written.
+pub trait Progress: Observer {
+    /// An update has been made, which [`Observer::advance`] counts next; `remaining` is the estimated time to the last one, in seconds.
+    fn step(&self, report: &StepReport, remaining: f64) {
         let _ = (report, remaining);
     }
 
     /// A validation has been made.
-    fn validation(&mut self, report: &ValidationReport) {
+    fn validation(&self, report: &ValidationReport) {
         let _ = report;
     }
 
     /// A file of the run was written.
-    fn wrote(&mut self, path: &std::path::Path) {
+    fn wrote(&self, path: &std::path::Path) {
         let _ = path;
     }
 }

@@ -117,10 +117,10 @@ impl Trainer {
     ///
     /// # Errors
     /// [`Error::Invalid`] if the loss is no longer finite; [`Error::Io`] if a file of the run cannot be written.
-    pub fn run(&mut self, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Finish> {
+    pub fn run(&mut self, stop: &AtomicBool, progress: &dyn Progress) -> Result<Finish> {
         let total = self.config.steps;
         let mut log = MetricsLog::open(&self.folder.join("metrics.jsonl"), self.steps_done(), total)?;
-        progress.start(self.steps_done(), total);
+        progress.begin("step", "training", self.steps_done() as usize, total as usize);
         if self.catch_up(stop, &mut log, progress)? == Finish::Stopped {
             return Ok(Finish::Stopped);
         }
@@ -142,7 +142,7 @@ impl Trainer {
         &mut self,
         stop: &AtomicBool,
         log: &mut MetricsLog,
-        progress: &mut dyn Progress,
+        progress: &dyn Progress,
     ) -> Result<Finish> {
         let step = self.steps_done();
         if step == 0 || step == self.config.steps {
@@ -168,7 +168,7 @@ impl Trainer {
         &mut self,
         at: usize,
         stop: &AtomicBool,
-        progress: &mut dyn Progress,
+        progress: &dyn Progress,
         log: &mut MetricsLog,
     ) -> Result<Finish> {
         let Running { stage, data } = self.stages[at].clone();
@@ -191,7 +191,7 @@ impl Trainer {
         stage: &Stage,
         batches: mpsc::Receiver<Prepared>,
         stop: &AtomicBool,
-        progress: &mut dyn Progress,
+        progress: &dyn Progress,
         log: &mut MetricsLog,
     ) -> Result<Finish> {
         let total = self.config.steps;
@@ -209,6 +209,7 @@ impl Trainer {
             let step = update.step;
             log.append(&update)?;
             progress.step(&update, mean * (total - step) as f64);
+            progress.advance(1);
             let mut looked = Ok(());
             if self.validates(step) && step != total {
                 looked = self.validate(stop, log, progress);
@@ -259,7 +260,7 @@ impl Trainer {
         })
     }
 
-    fn checkpoint(&self, log: &MetricsLog, progress: &mut dyn Progress) -> Result<()> {
+    fn checkpoint(&self, log: &MetricsLog, progress: &dyn Progress) -> Result<()> {
         // a state that is on disk must find its lines there too
         log.sync()?;
         let path = self.checkpoint_path();

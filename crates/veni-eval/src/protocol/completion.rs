@@ -22,7 +22,7 @@ use veni_data::parallel::parallel;
 use veni_data::{Item, Part};
 use veni_image::Picture;
 use veni_image::exposure::{log_luminance, over_pixels};
-use veni_image::metrics::{psnr, ssim};
+use veni_image::metrics::{Scores, psnr, ssim};
 use veni_image::tonemap::{REFERENCE_QUANTILE, quantile, srgb};
 use veni_light::light::CompactLight;
 use veni_light::sphere::Equirect;
@@ -65,12 +65,10 @@ impl Half {
     }
 }
 
-/// Scores of what is hidden, and of the light of the whole.
+/// Scores of what is hidden, HDR being log radiance here, and of the light of the whole.
 #[derive(Clone, Copy, Debug)]
 struct Scored {
-    ldr_psnr: f64,
-    ssim: f64,
-    hdr_psnr: f64,
+    scores: Scores,
     lit: Lit,
 }
 
@@ -219,12 +217,17 @@ fn score(grid: Equirect, half: Half, whole: &[f32], truth: &[f32]) -> Result<Sco
     };
     let [found, expected] = [hidden(whole), hidden(truth)];
     let [height, width] = half.shape(grid);
+    let shape = [height, width, 3];
     let (shown, target) = (display(&found), display(&expected));
+    let (found, expected) = (exact(&found), exact(&expected));
     let lit = compare(grid, whole, truth)?;
     Ok(Scored {
-        ldr_psnr: psnr(&shown, &target),
-        ssim: ssim(&shown, &target, [height, width, 3]),
-        hdr_psnr: psnr(&exact(&found), &exact(&expected)),
+        scores: Scores {
+            ldr_psnr: psnr(&shown, &target),
+            hdr_psnr: psnr(&found, &expected),
+            ssim: ssim(&shown, &target, shape),
+            hdr_ssim: ssim(&found, &expected, shape),
+        },
         lit: Lit { sun: hidden_sun(grid, half, whole, truth)?, ..lit },
     })
 }
@@ -240,26 +243,20 @@ fn hidden_sun(grid: Equirect, half: Half, whole: &[f32], truth: &[f32]) -> Resul
 }
 
 fn cells(scored: &Scored) -> Vec<Cell> {
-    let Scored { ldr_psnr, ssim, hdr_psnr, lit } = *scored;
-    let numbers = [
-        Cell::Number(ldr_psnr, 2),
-        Cell::Number(ssim, 3),
-        Cell::Number(hdr_psnr, 2),
-        Cell::Number(lit.error, 3),
-        Cell::Number(lit.aligned, 3),
-    ];
-    numbers.into_iter().chain(sun_cells(lit.sun)).collect()
+    let Scored { scores, lit } = *scored;
+    let errors = [Cell::Number(lit.error, 3), Cell::Number(lit.aligned, 3)];
+    score_cells(scores).into_iter().chain(errors).chain(sun_cells(lit.sun)).collect()
+}
+
+fn score_cells(scores: Scores) -> [Cell; 3] {
+    let Scores { ldr_psnr, ssim, hdr_psnr, .. } = scores;
+    [Cell::Number(ldr_psnr, 2), Cell::Number(ssim, 3), Cell::Number(hdr_psnr, 2)]
 }
 
 fn means(each: &[Scored]) -> Vec<Cell> {
-    let mean = |of: &dyn Fn(&Scored) -> f64| each.iter().map(of).sum::<f64>() / each.len() as f64;
-    let scores = [
-        Cell::Number(mean(&|s| s.ldr_psnr), 2),
-        Cell::Number(mean(&|s| s.ssim), 3),
-        Cell::Number(mean(&|s| s.hdr_psnr), 2),
-    ];
+    let scores = Scores::mean(each.iter().map(|s| &s.scores));
     let lit: Vec<_> = each.iter().map(|s| s.lit).collect();
-    scores.into_iter().chain(summary(&lit, [&|l| l.error, &|l| l.aligned])).collect()
+    score_cells(scores).into_iter().chain(summary(&lit, [&|l| l.error, &|l| l.aligned])).collect()
 }
 
 /// Panorama, what is seen of it, and the completions.

@@ -1,6 +1,6 @@
 //! Where the light comes from: what decides on which side shadows fall.
 
-use crate::luminance;
+use crate::exposure::log_luminance;
 use veni_light::sphere::Equirect;
 
 /// A sun is seen where the largest luminance is e⁶ = 400 times the geometric mean over the sphere, or more. Few panoramas are near
@@ -16,7 +16,7 @@ const GLOW: f32 = 10.0;
 /// # Panics
 /// If a length is not that of the grid.
 pub fn sun_error(grid: Equirect, prediction: &[f32], target: &[f32]) -> Option<f64> {
-    let target = log_luminance(grid, target);
+    let target = log_luminances(grid, target);
     let (mut mean, mut total) = (0.0, 0.0);
     for (k, ln) in target.iter().enumerate() {
         let weight = grid.solid_angle(k / grid.width);
@@ -24,7 +24,7 @@ pub fn sun_error(grid: Equirect, prediction: &[f32], target: &[f32]) -> Option<f
     }
     let largest = target.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     (largest - mean / total >= VISIBLE).then(|| {
-        let (a, b) = (brightest(grid, &log_luminance(grid, prediction)), brightest(grid, &target));
+        let (a, b) = (brightest(grid, &log_luminances(grid, prediction)), brightest(grid, &target));
         // exact for small angles too, where the cosine is flat
         let across = cross(a, b);
         f64::from(dot(across, across).sqrt().atan2(dot(a, b)).to_degrees())
@@ -32,15 +32,16 @@ pub fn sun_error(grid: Equirect, prediction: &[f32], target: &[f32]) -> Option<f
 }
 
 /// The direction (unit, z up) of the brightest light: the centre of the luminance within 10° of the brightest pixel.
-fn brightest(grid: Equirect, log_luminance: &[f64]) -> [f32; 3] {
-    let peak =
-        (0..log_luminance.len()).max_by(|a, b| log_luminance[*a].total_cmp(&log_luminance[*b])).unwrap_or(0);
+fn brightest(grid: Equirect, log_luminances: &[f64]) -> [f32; 3] {
+    let peak = (0..log_luminances.len())
+        .max_by(|a, b| log_luminances[*a].total_cmp(&log_luminances[*b]))
+        .unwrap_or(0);
     let directions = grid.directions();
     let (towards, near) = (directions[peak], GLOW.to_radians().cos());
     let mut sum = [0f32; 3];
-    for (k, (direction, ln)) in directions.into_iter().zip(log_luminance).enumerate() {
+    for (k, (direction, ln)) in directions.into_iter().zip(log_luminances).enumerate() {
         if dot(direction, towards) >= near {
-            let weight = (ln - log_luminance[peak]).exp() * grid.solid_angle(k / grid.width);
+            let weight = (ln - log_luminances[peak]).exp() * grid.solid_angle(k / grid.width);
             sum.iter_mut().zip(direction).for_each(|(sum, d)| *sum += weight as f32 * d);
         }
     }
@@ -56,9 +57,9 @@ fn cross([ax, ay, az]: [f32; 3], [bx, by, bz]: [f32; 3]) -> [f32; 3] {
     [ay * bz - by * az, az * bx - bz * ax, ax * by - bx * ay]
 }
 
-fn log_luminance(grid: Equirect, image: &[f32]) -> Vec<f64> {
+fn log_luminances(grid: Equirect, image: &[f32]) -> Vec<f64> {
     assert_eq!(image.len(), 3 * grid.len(), "values of a {} × {} image", grid.width, grid.height);
-    image.as_chunks::<3>().0.iter().map(|rgb| f64::from(luminance(rgb.map(f32::exp))).ln()).collect()
+    image.as_chunks::<3>().0.iter().map(|rgb| f64::from(log_luminance(*rgb))).collect()
 }
 
 #[cfg(test)]
@@ -80,7 +81,7 @@ mod tests {
     #[test]
     fn the_sun_is_where_it_was_put() {
         for (column, row) in [(5, 20), (127, 31), (64, 2)] {
-            let found = brightest(GRID, &log_luminance(GRID, &sky(column, row)));
+            let found = brightest(GRID, &log_luminances(GRID, &sky(column, row)));
             let put = GRID.direction(column, row);
             assert!(dot(found, put) > 0.5_f32.to_radians().cos(), "{found:?} {put:?}");
         }

@@ -19,7 +19,7 @@
 mod search;
 mod temperature;
 
-pub use temperature::temperature;
+pub use temperature::{chromaticity, temperature};
 
 use crate::field::Decoder;
 use crate::latent::{Latent, Prior, SunRequest};

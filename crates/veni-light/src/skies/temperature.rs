@@ -23,15 +23,17 @@ const RANGE: [f64; 2] = [1500.0, 50_000.0];
 /// Largest inverse slope that the cubic is taken at: beyond it falls.
 const STEEPEST: f64 = 1.2;
 
+/// Chromaticity x, y (CIE 1931) of a colour in linear Rec. 709; None of what is dark.
+pub fn chromaticity(rgb: [f64; 3]) -> Option<[f64; 2]> {
+    let [x, y, z] = XYZ.map(|row| row.iter().zip(rgb).map(|(m, v)| m * v).sum::<f64>());
+    let sum = x + y + z;
+    (sum > 0.0 && sum.is_finite()).then(|| [x / sum, y / sum])
+}
+
 /// Correlated colour temperature of a colour in linear Rec. 709, kelvin; None for what is too red, too blue, too green or dark.
 /// Within 1.5 % of black bodies from 2000 to 15 000 K.
 pub fn temperature(rgb: [f64; 3]) -> Option<f64> {
-    let [x, y, z] = XYZ.map(|row| row.iter().zip(rgb).map(|(m, v)| m * v).sum::<f64>());
-    let sum = x + y + z;
-    if !(sum > 0.0 && sum.is_finite()) {
-        return None;
-    }
-    let [x, y] = [x / sum, y / sum];
+    let [x, y] = chromaticity(rgb)?;
     let slope = |at: Epicentre| (y > at.y).then_some((x - at.x) / (y - at.y));
     let warm = slope(WARM).filter(|n| *n < STEEPEST).map(|n| CUBIC.iter().fold(0.0, |t, c| t * n + c));
     let kelvin = match warm {
@@ -87,7 +89,10 @@ mod tests {
             // the fit of the matching functions is no better than the formulas
             assert!((ours / kelvin - 1.0).abs() < 0.015, "{kelvin}: {ours}");
         }
-        // the white point
+        // the white point, D65
+        let [x, y] = chromaticity([1.0; 3]).unwrap();
+        assert!((x - 0.3127).abs() < 5e-5 && (y - 0.3290).abs() < 5e-5, "{x} {y}");
+        assert_eq!(chromaticity([0.0; 3]), None);
         assert!((temperature([1.0; 3]).unwrap() - 6504.0).abs() < 20.0);
         assert_eq!(temperature([0.0; 3]), None);
         assert_eq!(temperature([1.0, 0.0, 0.0]), None);

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 use veni_light::light::{CompactLight, Light, luminance};
+use veni_light::skies::{chromaticity, temperature};
 
 use super::convention::Convention;
 
@@ -128,24 +129,12 @@ fn line(out: &mut String, name: &str, light: &CompactLight, share: f32) {
     );
 }
 
-/// Chromaticity and correlated colour temperature (McCamy 1992) of light in Rec. 709.
-fn white([r, g, b]: [f32; 3]) -> String {
-    let [r, g, b] = [r, g, b].map(f64::from);
-    let x = 0.4124 * r + 0.3576 * g + 0.1805 * b;
-    let y = 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    let z = 0.0193 * r + 0.1192 * g + 0.9505 * b;
-    let sum = x + y + z;
-    if sum <= 0.0 {
-        return String::new();
-    }
-    let (x, y) = (x / sum, y / sum);
-    let n = (x - 0.332) / (0.1858 - y);
-    let kelvin = 437.0 * n.powi(3) + 3601.0 * n * n + 6861.0 * n + 5517.0;
-    if (1500.0..=25000.0).contains(&kelvin) {
-        format!("; light on a level surface: x {x:.4} y {y:.4}, {kelvin:.0} K")
-    } else {
-        format!("; light on a level surface: x {x:.4} y {y:.4}")
-    }
+/// Chromaticity and, if it is near that of a black body, correlated colour temperature of light in Rec. 709.
+fn white(rgb: [f32; 3]) -> String {
+    let rgb = rgb.map(f64::from);
+    let Some([x, y]) = chromaticity(rgb) else { return String::new() };
+    let kelvin = temperature(rgb).map(|kelvin| format!(", {kelvin:.0} K")).unwrap_or_default();
+    format!("; light on a level surface: x {x:.4} y {y:.4}{kelvin}")
 }
 
 #[cfg(test)]
@@ -164,5 +153,7 @@ mod tests {
         let text = white([1.0; 3]);
         assert!(text.contains("x 0.3127 y 0.3290, 65"), "{text}");
         assert_eq!(white([0.0; 3]), "");
+        // a red that no black body has
+        assert_eq!(white([1.0, 0.0, 0.0]), "; light on a level surface: x 0.6400 y 0.3300");
     }
 }

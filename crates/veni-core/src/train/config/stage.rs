@@ -41,9 +41,10 @@ pub struct StageConfig {
     /// Number of updates.
     pub steps: u64,
     /// What differs, by the names that the settings have in the run's configuration. Tables are merged key by key; a
-    /// schedule of another kind, and the weight of a loss, are replaced whole.
+    /// schedule of another kind, and the weight of a loss, are replaced whole. Not public: another major version of the library for
+    /// TOML would be another type here.
     #[serde(flatten)]
-    pub changes: Table,
+    pub(in crate::train) changes: Table,
 }
 
 /// A stage, ready to run.

@@ -89,6 +89,7 @@ impl Operator {
 /// difference of the filtered planes, averaged over the operator's stencils and the scales; each scale takes every second
 /// row and column of the one before, nothing wraps. With `normalise` both inputs are first made free of
 /// shift and scale, (x − median)/mean|x − median| over everything.
+#[doc(hidden)]
 pub fn reference_planes(
     prediction: Tensor<3>,
     target: Tensor<3>,

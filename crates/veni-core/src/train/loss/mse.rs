@@ -83,6 +83,7 @@ fn display(log_radiance: Tensor<4>, white: Tensor<4>) -> Tensor<4> {
 ///
 /// # Panics
 /// If that is not a single value.
+#[doc(hidden)]
 pub fn brightest<const D: usize>(
     form: LossForm,
     fraction: f64,

@@ -46,7 +46,7 @@ impl Trainer {
         &mut self,
         stop: &AtomicBool,
         log: &mut MetricsLog,
-        progress: &mut dyn Progress,
+        progress: &dyn Progress,
     ) -> Result<()> {
         let network = self.averaged()?;
         let subset = |set: &Dataset, most: usize| match set.items().get(..most) {
@@ -119,7 +119,7 @@ impl Trainer {
         copies: usize,
         step: u64,
         stop: &AtomicBool,
-        progress: &mut dyn Progress,
+        progress: &dyn Progress,
     ) -> Result<()> {
         let (prior, latents) = self.prior(network, copies, stop)?;
         let info = ModelInfo {
@@ -239,7 +239,7 @@ impl Trainer {
         Ok(Codes { codes, variances, own: chosen.len() })
     }
 
-    pub(super) fn preview(&self, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<()> {
+    pub(super) fn preview(&self, stop: &AtomicBool, progress: &dyn Progress) -> Result<()> {
         let network = self.averaged()?;
         let (prior, _) = self.prior(&network, 0, stop)?;
         let (val, train) = (self.splits.val.items(), self.splits.train.items());
@@ -266,7 +266,7 @@ impl Trainer {
         &mut self,
         stop: &AtomicBool,
         log: &mut MetricsLog,
-        progress: &mut dyn Progress,
+        progress: &dyn Progress,
     ) -> Result<()> {
         self.validate(stop, log, progress)?;
         self.preview(stop, progress)?;

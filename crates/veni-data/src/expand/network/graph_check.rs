@@ -4,10 +4,9 @@
 use std::collections::HashSet;
 
 use super::wire::{Field, Fields, numbers};
-use crate::limits::{
-    MAX_ONNX_CONSTANT, MAX_ONNX_NESTING, MAX_ONNX_NODES, MAX_ONNX_PADDING, MAX_ONNX_STRIDE, at_most,
-};
+use crate::limits::{MAX_ONNX_CONSTANT, MAX_ONNX_NESTING, MAX_ONNX_NODES, MAX_ONNX_PADDING, MAX_ONNX_STRIDE};
 use crate::{Error, Result};
+use veni_light::limits::at_most;
 
 /// Attributes that are multiplied with an image's size, and those that are added to it.
 const STRIDES: [&[u8]; 2] = [b"strides", b"dilations"];
@@ -168,7 +167,7 @@ impl<'a> Node<'a> {
             _ => return Ok(()),
         };
         let name = String::from_utf8_lossy(name);
-        values.iter().try_for_each(|value| at_most(&format!("as one of its {name}"), *value, limit))
+        values.iter().try_for_each(|value| at_most(&format!("pixels of its {name}"), *value, limit))
     }
 }
 

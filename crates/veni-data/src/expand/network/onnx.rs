@@ -10,8 +10,9 @@ use veni_light::digest::Digest;
 
 use super::wire::Fields;
 use super::{Network, graph_check};
-use crate::limits::{MAX_ONNX_BYTES, MAX_ONNX_PIXELS, MAX_ONNX_SECONDS, at_most};
+use crate::limits::{MAX_ONNX_BYTES, MAX_ONNX_PIXELS, MAX_ONNX_SECONDS};
 use crate::{Error, Result};
+use veni_light::limits::at_most;
 
 /// The size at which a network that takes any is tried when it is loaded, \[height, width\].
 const TRIAL: [usize; 2] = [64, 128];

@@ -10,6 +10,7 @@ use super::{Basis, combine};
 use veni_light::sphere::Equirect;
 
 /// What stands for a pixel in the projection: the direction of its upper left corner, θ = πj/H and φ = 2πi/W.
+#[doc(hidden)]
 pub fn corner_directions(grid: Equirect) -> Vec<[f64; 3]> {
     let direction = |j: usize, i: usize| {
         let (sin_t, cos_t) = (PI * j as f64 / grid.height as f64).sin_cos();

@@ -69,7 +69,7 @@ fn a_resumed_run_holds_its_panoramas_elsewhere_and_ends_with_the_same_weights() 
     complete(&mut Trainer::create(&whole, config.clone(), "test").unwrap());
     let stop = AtomicBool::new(false);
     let mut trainer = Trainer::create(&moved, config, "test").unwrap();
-    trainer.run(&stop, &mut After { step: 2, stop: &stop, panic: false }).unwrap();
+    trainer.run(&stop, &After { step: 2, stop: &stop, panic: false }).unwrap();
     drop(trainer);
     let settings = file(&moved, "config.toml");
     fs::remove_dir(&gone).unwrap();

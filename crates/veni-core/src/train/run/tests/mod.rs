@@ -17,6 +17,7 @@ use veni_fit::schedule::{LearningRate, WeightSchedule};
 use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
 use veni_light::latent::Latent;
 use veni_light::model::Model;
+use veni_light::progress::Observer;
 use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
@@ -54,8 +55,14 @@ struct After<'a> {
     panic: bool,
 }
 
+impl Observer for After<'_> {
+    fn begin(&self, _: &'static str, _: &str, _: usize, _: usize) {}
+
+    fn advance(&self, _: usize) {}
+}
+
 impl Progress for After<'_> {
-    fn step(&mut self, report: &StepReport, _remaining: f64) {
+    fn step(&self, report: &StepReport, _remaining: f64) {
         if report.step == self.step {
             assert!(!self.panic, "killed");
             self.stop.store(true, Ordering::Relaxed);
@@ -64,7 +71,7 @@ impl Progress for After<'_> {
 }
 
 fn complete(trainer: &mut Trainer) {
-    let finish = trainer.run(&AtomicBool::new(false), &mut crate::train::progress::Silent).unwrap();
+    let finish = trainer.run(&AtomicBool::new(false), &crate::train::progress::Silent).unwrap();
     assert_eq!(finish, Finish::Complete);
 }
 

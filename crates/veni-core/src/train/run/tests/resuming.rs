@@ -31,7 +31,7 @@ fn continues_to_the_bit(config: TrainConfig, more: &[&str]) {
 
     let stop = AtomicBool::new(false);
     let mut trainer = Trainer::create(&stopped, config.clone(), "test").unwrap();
-    let finish = trainer.run(&stop, &mut After { step: 3, stop: &stop, panic: false }).unwrap();
+    let finish = trainer.run(&stop, &After { step: 3, stop: &stop, panic: false }).unwrap();
     assert_eq!((finish, trainer.steps_done()), (Finish::Stopped, 3));
     let message = Trainer::resume(&stopped, "test").unwrap_err().to_string();
     assert!(message.contains("at work here"), "a run has one trainer at a time: {message}");
@@ -41,8 +41,8 @@ fn continues_to_the_bit(config: TrainConfig, more: &[&str]) {
     complete(&mut trainer);
 
     let mut trainer = Trainer::create(&killed, config, "test").unwrap();
-    let mut progress = After { step: 3, stop: &stop, panic: true };
-    let run = catch_unwind(AssertUnwindSafe(|| trainer.run(&AtomicBool::new(false), &mut progress)));
+    let progress = After { step: 3, stop: &stop, panic: true };
+    let run = catch_unwind(AssertUnwindSafe(|| trainer.run(&AtomicBool::new(false), &progress)));
     assert!(run.is_err());
     drop(trainer);
     let mut trainer = Trainer::resume(&killed, "test").unwrap();
@@ -74,7 +74,7 @@ fn a_validation_that_was_stopped_is_made_later() {
     complete(&mut Trainer::create(&whole, config.clone(), "test").unwrap());
     let stop = AtomicBool::new(false);
     let mut trainer = Trainer::create(&stopped, config, "test").unwrap();
-    let finish = trainer.run(&stop, &mut After { step: 2, stop: &stop, panic: false }).unwrap();
+    let finish = trainer.run(&stop, &After { step: 2, stop: &stop, panic: false }).unwrap();
     assert_eq!((finish, trainer.steps_done()), (Finish::Stopped, 2));
     assert_eq!(losses(&stopped).len(), 2, "two updates and no validation");
     assert!(!stopped.join("model.safetensors").exists() && !stopped.join("preview/step-000002.png").exists());
