@@ -128,8 +128,8 @@ pub(crate) fn last_of(mut errors: Vec<anyhow::Error>) -> anyhow::Result<Outcome>
     last.map_or(Ok(Outcome::Fine), Err)
 }
 
-/// An error and what caused it. A cause whose words stand there already is not said twice: graphics devices' errors have
-/// those of their causes in their own.
+/// An error and what caused it. A cause whose words stand there already is not said twice: wgpu's errors have those of their
+/// causes in their own.
 fn chain(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain().map(|cause| one_line(&cause.to_string())) {

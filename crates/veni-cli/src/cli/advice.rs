@@ -183,7 +183,17 @@ fn documents() -> Vec<PathBuf> {
         |folder: &Path| std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect::<Vec<_>>();
     let root = workspace();
     let mut folders = files(&root.join("crates"));
-    for folder in ["", "docs", "docs/results", "examples", "examples/bevy", "assets", "assets/panoramas"] {
+    let here = [
+        "",
+        "assets",
+        "assets/panoramas",
+        "benches/peer",
+        "docs",
+        "docs/results",
+        "examples",
+        "examples/bevy",
+    ];
+    for folder in here.into_iter().chain(["scripts/engines"]) {
         folders.push(root.join(folder));
     }
     let mut found: Vec<_> = folders.iter().flat_map(|folder| files(folder)).collect();

@@ -74,10 +74,14 @@ pub(super) fn open(choice: DecodeDevice, model: &Model, report: Report) -> Resul
             Ok(Some(gpu))
         }
         Err(error) if choice == DecodeDevice::Auto => {
+            let error = error.with_source();
             report.note(format_args!("note: {name} cannot be used ({error}); baking on the CPU"));
             Ok(None)
         }
-        Err(error) => bail!("--device gpu: {name}: {error}; update its driver, or use --device cpu"),
+        Err(error) => {
+            let error = error.with_source();
+            bail!("--device gpu: {name}: {error}; update its driver, or use --device cpu")
+        }
     }
 }
 
@@ -134,7 +138,9 @@ impl Conditioned {
         rows.map_err(|error| match error {
             // what `each` said is not a fault of the device
             veni_gpu::Error::Light(error) => error,
-            error => veni_light::Error::unsupported(format!("{name}: {error}; try --device cpu")),
+            error => {
+                veni_light::Error::unsupported(format!("{name}: {}; try --device cpu", error.with_source()))
+            }
         })
     }
 }

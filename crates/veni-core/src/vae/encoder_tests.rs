@@ -2,8 +2,11 @@
 
 use super::*;
 use crate::nn::testing::{assert_gradients, features, rng};
+use crate::vae::Veni;
+use crate::vae::weights;
 use burn::tensor::TensorData;
-use veni_light::model::VnReluForm;
+use veni_light::model::{DecoderConfig, ModelConfig, ModelInfo, VnReluForm};
+use veni_light::sphere::Equirect;
 
 const STRIPES: usize = 8;
 const SAMPLES: usize = 16;
@@ -181,6 +184,45 @@ fn gradients_of_every_variant() {
             Tensor::cat(parts, 2).unsqueeze()
         });
     }
+}
+
+/// What encodes for users is a second implementation, in plain f32.
+#[test]
+fn the_plain_encoder_is_this_one() {
+    let device = Device::flex();
+    let grid = Equirect::new(64, 32);
+    let sky = |d: [f32; 3]| [2.0 * d[2] + d[0], (3.0 * d[1]).sin() + d[2], 3.0 * d[0] * d[2] - 0.5];
+    let panorama: Vec<f32> = grid.directions().into_iter().flat_map(sky).collect();
+    for (name, config) in variants() {
+        let decoder = DecoderConfig { hidden: 16, layers: 1, ..DecoderConfig::default() };
+        let whole = ModelConfig { decoder, encoder: Some(config.clone()), ..ModelConfig::decode_only(5) };
+        let mut veni = Veni::new(&whole, &mut rng(1), &device).unwrap();
+        veni.encoder = encoder(&config, &device);
+        let ours = veni.encode(grid, &[&panorama]).unwrap().remove(0);
+        let error = |veni: &Veni| {
+            let model = veni.to_model(&whole, ModelInfo::default()).unwrap();
+            let plain = veni_fit::Encoder::new(&model).unwrap().encode(grid, &[&panorama]).unwrap().remove(0);
+            let variances = plain.log_variances.map(|l| l.into_iter().map(f32::exp).collect::<Vec<_>>());
+            assert_eq!(variances.is_some(), ours.variances.is_some(), "{name}");
+            let parts = [(plain.vectors.into_flattened(), ours.vectors.as_flattened())];
+            let variances = variances.iter().cloned().zip(ours.variances.as_deref());
+            parts.into_iter().chain(variances).map(|(a, b)| largest_error(&a, b)).fold(0f32, f32::max)
+        };
+        let same = error(&veni);
+        assert!(same < 1e-5, "{name}: {same}");
+        let mut moved = weights::read(&veni, "");
+        let (_, weight) = moved.iter_mut().find(|(name, _)| name.starts_with("encoder.project_in")).unwrap();
+        weight.data[0] += 0.1;
+        let moved = error(&weights::write(veni.clone(), "", &moved).unwrap());
+        assert!(moved > 1e-4, "{name}: one moved weight, and {moved}");
+    }
+}
+
+/// max |a − b| / max |b|.
+fn largest_error(a: &[f32], b: &[f32]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    let largest = |values: &mut dyn Iterator<Item = f32>| values.fold(0f32, |most, v| most.max(v.abs()));
+    largest(&mut a.iter().zip(b).map(|(a, b)| a - b)) / largest(&mut b.iter().copied())
 }
 
 /// A class token without x and y meets norms at zero in the full SO(2) transformer, and a black stripe elsewhere.
