@@ -9,7 +9,8 @@ use super::Cli;
 use crate::features::{GPU, LEARN};
 
 /// Options of cargo and other programs, which documents and messages name too.
-const FOREIGN: [&str; 37] = [
+const FOREIGN: [&str; 41] = [
+    "allocator",
     "array",
     "balls",
     "bench",
@@ -24,6 +25,7 @@ const FOREIGN: [&str; 37] = [
     "example",
     "export",
     "features",
+    "form",
     "ibl-samples",
     "include",
     "lib",
@@ -35,6 +37,7 @@ const FOREIGN: [&str; 37] = [
     "panorama",
     "path",
     "picture",
+    "record",
     "release",
     "same",
     "sampler",
@@ -47,6 +50,7 @@ const FOREIGN: [&str; 37] = [
     "time",
     "topic",
     "veni",
+    "veni-cli",
 ];
 /// What follows the program's name in a sentence.
 const PROSE: [&str; 1] = ["was"];
