@@ -1,6 +1,6 @@
 //! AVIF photographs. With feature `avif` they are read, without it refused by name.
 
-use crate::util::{Dir, model};
+use crate::util::Dir;
 
 /// 64 × 32: red grows along the rows, green down the columns.
 const PICTURE: &[u8] =
@@ -15,9 +15,7 @@ fn folder() -> Dir {
 
 const PREPARE: [&str; 9] = ["prepare", "in", "-o", "data", "--size", "64", "--val", "0", "-q"];
 
-fn encode() -> [&'static str; 6] {
-    ["encode", "in/street.avif", "--model", model(), "-o", "code.json"]
-}
+const ENCODE: [&str; 4] = ["encode", "in/street.avif", "-o", "code.json"];
 
 #[cfg(not(feature = "avif"))]
 #[test]
@@ -27,7 +25,7 @@ fn a_program_without_a_decoder_says_how_to_build_one() {
     assert_ne!(run.code, Some(0), "{run:?}");
     let said = format!("{}{}", run.out, run.err);
     assert!(said.contains("in/street.avif") && said.contains("the feature avif"), "{said}");
-    dir.refused(&encode(), &["in/street.avif", "the feature avif"]);
+    dir.refused(&ENCODE, &["in/street.avif", "the feature avif"]);
 }
 
 #[cfg(feature = "avif")]
@@ -58,7 +56,7 @@ fn avif_photographs_become_panoramas() {
 #[test]
 fn what_holds_the_range_of_a_display_is_fitted_and_not_encoded() {
     let dir = folder();
-    let args = ["fit", "in/street.avif", "--model", model(), "--steps", "20", "-o", "code.json"];
+    let args = ["fit", "in/street.avif", "--steps", "20", "-o", "code.json"];
     let [found] = &dir.json(&args)[..] else { panic!("one object") };
     assert!(found["loss"].as_f64().unwrap().is_finite(), "{found}");
     let code: serde_json::Value =
@@ -66,5 +64,5 @@ fn what_holds_the_range_of_a_display_is_fitted_and_not_encoded() {
     assert!(code["n"].as_u64().is_some(), "{code}");
     std::fs::remove_file(dir.path("code.json")).unwrap();
     // radiance is in none of its values: refused, and what helps is said
-    dir.refused(&encode(), &["in/street.avif", "AVIF holds no high dynamic range", "veni-cli prepare"]);
+    dir.refused(&ENCODE, &["in/street.avif", "AVIF holds no high dynamic range", "veni-cli prepare"]);
 }
