@@ -9,7 +9,7 @@ use super::Cli;
 use crate::features::{GPU, LEARN};
 
 /// Options of cargo and other programs, which documents and messages name too.
-const FOREIGN: [&str; 41] = [
+const FOREIGN: [&str; 42] = [
     "allocator",
     "array",
     "balls",
@@ -51,6 +51,7 @@ const FOREIGN: [&str; 41] = [
     "topic",
     "veni",
     "veni-cli",
+    "workspace",
 ];
 /// What follows the program's name in a sentence.
 const PROSE: [&str; 1] = ["was"];
