@@ -197,8 +197,9 @@ fn documents() -> Vec<PathBuf> {
         "docs/results",
         "examples",
         "examples/bevy",
+        "scripts/engines",
     ];
-    for folder in here.into_iter().chain(["scripts/engines"]) {
+    for folder in here {
         folders.push(root.join(folder));
     }
     let mut found: Vec<_> = folders.iter().flat_map(|folder| files(folder)).collect();

@@ -4,12 +4,12 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::block_equations::BlockEquations;
 use super::in_tasks;
 use super::lobes::LobeRows;
 use super::normal::{LocalQuadratic, NormalEquations, QuadraticLoss};
-use super::operations::accumulate_product;
 use super::outer::{self, Wide};
-use super::pass::{flat, flat_mut, lane_sum};
+use super::pass::{flat_mut, lane_sum};
 use crate::field::aligned::Aligned;
 use crate::field::block::{Row, VECTORS};
 use crate::latent::Lobe;
@@ -76,56 +76,32 @@ impl WithSimd for OfLobes<'_> {
         let (lanes, unknowns) = (outer::lanes::<S>(), LobeRows::OF_COLOUR * lobes.len());
         let panels = outer::panels::<S>(unknowns);
         let wide = size_of::<Wide<S>>() / size_of::<S::f32s>();
-        let rows = 4 * 3 + 3 * unknowns;
+        let rows = 2 * 3 + BlockEquations::<S>::rows(unknowns) + 2 * unknowns;
         let vectors = wide * panels * (lanes + 3 * unknowns) + 3 * unknowns;
         let scratch = scratch.at_least(lanes * rows + S::F32_LANES * vectors);
         let (all, workspace) = S::as_mut_simd_f32s(scratch).0.split_at_mut(VECTORS * rows);
         let all: &mut [Row<S>] = all.as_chunks_mut::<VECTORS>().0;
         let (direction, all) = all.split_at_mut(3);
         let (rgb, all) = all.split_at_mut(3);
-        let (gradients, all) = all.split_at_mut(3);
-        let (weights, all) = all.split_at_mut(3);
-        let (shapes, all) = all.split_at_mut(unknowns);
-        let (jacobian, weighted) = all.split_at_mut(unknowns);
         workspace[..vectors].fill(simd.splat_f32s(0.0));
         let (transposed, workspace) = workspace.split_at_mut(wide * panels * lanes);
         let (matrices, gradient) = workspace.split_at_mut(3 * wide * panels * unknowns);
+        let matrices: &mut [Wide<S>] = matrices.as_chunks_mut().0;
+        let (mut block, all) = BlockEquations::new(unknowns, all, transposed.as_chunks_mut().0);
+        let (shapes, jacobian) = all.split_at_mut(unknowns);
         // without lobes there is a loss and nothing that moves
         let colours = if lobes.is_empty() { 0 } else { 3 };
-        let transposed: &mut [Wide<S>] = transposed.as_chunks_mut().0;
-        let matrices: &mut [Wide<S>] = matrices.as_chunks_mut().0;
 
         for (b, (directions, base)) in directions.chunks(lanes).zip(base.chunks(lanes)).enumerate() {
             fill::<S>(directions, direction);
             fill::<S>(base, rgb);
             LobeRows::shapes(lobes, simd, direction, shapes, rgb);
-            {
-                let rgb = flat::<S>(rgb);
-                let (gradients, weights) = (flat_mut::<S>(gradients), flat_mut::<S>(weights));
-                // idle lanes of a short block count nothing
-                gradients.fill(0.0);
-                weights.fill(0.0);
-                for i in 0..directions.len() {
-                    let local = loss(b * lanes + i, [0, 1, 2].map(|c| rgb[c * lanes + i]));
-                    sums.loss += local.loss;
-                    for c in 0..3 {
-                        gradients[c * lanes + i] = local.gradient[c];
-                        weights[c * lanes + i] = local.weight[c];
-                    }
-                }
-            }
+            block.ask(loss, b * lanes, directions.len(), rgb, 0.0, &mut sums.loss);
             for c in 0..colours {
                 LobeRows::of_colour(lobes, simd, shapes, c, jacobian);
-                let sums = &mut gradient[c * unknowns..][..unknowns];
-                for ((weighted, row), sum) in weighted.iter_mut().zip(&*jacobian).zip(sums) {
-                    for v in 0..VECTORS {
-                        weighted[v] = simd.mul_f32s(row[v], weights[c][v]);
-                    }
-                    *sum = accumulate_product(simd, *sum, row, &gradients[c]);
-                }
-                outer::transpose::<S>(weighted, transposed);
+                let gradient = &mut gradient[c * unknowns..][..unknowns];
                 let matrix = &mut matrices[c * panels * unknowns..][..panels * unknowns];
-                outer::add(simd, jacobian, transposed, matrix);
+                block.add(simd, c, jacobian, gradient, matrix);
             }
         }
 

@@ -27,8 +27,7 @@ impl LobeRows {
         Lobe::COORDINATES * lobe + if within == 0 { c } else { within + 2 }
     }
 
-    /// What the rows of all colours share, [`OF_COLOUR`](Self::OF_COLOUR) rows a lobe: e^{s(⟨d,u⟩ − 1)}, that by the exponent,
-    /// and that by s times the tangents' part of d. The lobes are added to the log radiance `rgb`.
+    /// The [`shape`]s of a block, [`OF_COLOUR`](Self::OF_COLOUR) rows a lobe. The lobes are added to the log radiance `rgb`.
     #[inline(always)]
     pub(super) fn shapes<S: Simd>(
         all: &[Self],
@@ -41,15 +40,9 @@ impl LobeRows {
             all.iter().zip(shapes.as_chunks_mut::<{ Self::OF_COLOUR }>().0)
         {
             for v in 0..VECTORS {
-                let d = [direction[0][v], direction[1][v], direction[2][v]];
-                let exponent = lobes::exponent(simd, lobe, d);
-                let gauss = math::exp(simd, exponent);
-                shapes[0][v] = gauss;
-                shapes[1][v] = simd.mul_f32s(gauss, exponent);
-                let steep = simd.mul_f32s(gauss, simd.splat_f32s(lobe.sharpness));
-                for (row, tangent) in shapes[2..].iter_mut().zip(tangents) {
-                    row[v] = simd.mul_f32s(steep, along(simd, d, tangent));
-                }
+                let shape = shape(simd, lobe, tangents, direction, v);
+                let gauss = shape[0];
+                shapes.iter_mut().zip(shape).for_each(|(row, shape)| row[v] = shape);
                 for (row, amplitude) in rgb.iter_mut().zip(lobe.amplitude) {
                     row[v] = simd.mul_add_e_f32s(simd.splat_f32s(amplitude), gauss, row[v]);
                 }
@@ -86,21 +79,35 @@ impl LobeRows {
         for (Self { lobe, tangents }, rows) in all.iter().zip(rows.as_chunks_mut::<{ Lobe::COORDINATES }>().0)
         {
             for v in 0..VECTORS {
-                let d = [direction[0][v], direction[1][v], direction[2][v]];
-                let exponent = lobes::exponent(simd, lobe, d);
-                let gauss = math::exp(simd, exponent);
-                let value = simd.mul_f32s(gauss, simd.splat_f32s(lobe.amplitude[c]));
+                let [gauss, rest @ ..] = shape(simd, lobe, tangents, direction, v);
                 for (k, row) in rows[..3].iter_mut().enumerate() {
                     row[v] = if k == c { gauss } else { zero };
                 }
-                rows[3][v] = simd.mul_f32s(value, exponent);
-                let steep = simd.mul_f32s(value, simd.splat_f32s(lobe.sharpness));
-                for (row, tangent) in rows[4..].iter_mut().zip(tangents) {
-                    row[v] = simd.mul_f32s(steep, along(simd, d, tangent));
+                let amplitude = simd.splat_f32s(lobe.amplitude[c]);
+                for (row, shape) in rows[3..].iter_mut().zip(rest) {
+                    row[v] = simd.mul_f32s(shape, amplitude);
                 }
             }
         }
     }
+}
+
+/// What the rows of all colours share, in the directions of vector `v`: e^{s(⟨d,u⟩ − 1)}, that by the exponent, and that by s
+/// times the tangents' part of d.
+#[inline(always)]
+fn shape<S: Simd>(
+    simd: S,
+    lobe: &Lobe,
+    tangents: &[[f32; 3]; 2],
+    direction: &[Row<S>],
+    v: usize,
+) -> [S::f32s; LobeRows::OF_COLOUR] {
+    let d = [direction[0][v], direction[1][v], direction[2][v]];
+    let exponent = lobes::exponent(simd, lobe, d);
+    let gauss = math::exp(simd, exponent);
+    let steep = simd.mul_f32s(gauss, simd.splat_f32s(lobe.sharpness));
+    let [along, upwards] = tangents.each_ref().map(|tangent| simd.mul_f32s(steep, along(simd, d, tangent)));
+    [gauss, simd.mul_f32s(gauss, exponent), along, upwards]
 }
 
 /// ⟨d, t⟩.

@@ -10,6 +10,7 @@
 //! Sums over directions run in a fixed order: the same bits whatever the number of threads.
 
 mod backward;
+mod block_equations;
 mod chain;
 mod jacobian;
 mod lobe_equations;

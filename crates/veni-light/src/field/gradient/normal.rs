@@ -7,12 +7,12 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::block_equations::BlockEquations;
 use super::in_tasks;
 use super::jacobian::{Chain, Rows};
 use super::lobes::LobeRows;
-use super::operations::accumulate_product;
 use super::outer::{self, Wide};
-use super::pass::{Pass, flat, flat_mut, lane_sum};
+use super::pass::{Pass, lane_sum};
 use crate::field::aligned::Aligned;
 use crate::field::block::VECTORS;
 use crate::field::mlp::Mlp;
@@ -140,51 +140,26 @@ impl WithSimd for Normal<'_> {
         let (lanes, unknowns) = (outer::lanes::<S>(), sums.gradient.len());
         let panels = outer::panels::<S>(unknowns);
         let wide = size_of::<Wide<S>>() / size_of::<S::f32s>();
-        let rows = Pass::<S>::rows(mlp) + 2 * 3 + 2 * unknowns + chain.padded();
+        let rows = Pass::<S>::rows(mlp) + BlockEquations::<S>::rows(unknowns) + unknowns + chain.padded();
         let vectors = wide * panels * (lanes + unknowns) + unknowns;
         let scratch = scratch.at_least(lanes * rows + S::F32_LANES * vectors);
         let (all, workspace) = S::as_mut_simd_f32s(scratch).0.split_at_mut(VECTORS * rows);
         let (mut pass, rest) = Pass::new(simd, mlp, folded, all.as_chunks_mut::<VECTORS>().0);
-        let (gradients, rest) = rest.split_at_mut(3);
-        let (weights, rest) = rest.split_at_mut(3);
-        let (jacobian, rest) = rest.split_at_mut(unknowns);
-        let (weighted, polar) = rest.split_at_mut(unknowns);
-        let zero = simd.splat_f32s(0.0);
-        workspace[..vectors].fill(zero);
+        workspace[..vectors].fill(simd.splat_f32s(0.0));
         let (transposed, workspace) = workspace.split_at_mut(wide * panels * lanes);
         let (matrix, workspace) = workspace.split_at_mut(wide * panels * unknowns);
-        let (transposed, matrix) = (transposed.as_chunks_mut().0, matrix.as_chunks_mut().0);
+        let matrix = matrix.as_chunks_mut().0;
         let gradient = &mut workspace[..unknowns];
+        let (mut block, rest) = BlockEquations::new(unknowns, rest, transposed.as_chunks_mut().0);
+        let (jacobian, polar) = rest.split_at_mut(unknowns);
         let mut rows = Rows::new(simd, chain, lobes, jacobian, polar);
 
         for (b, directions) in directions.chunks(lanes).enumerate() {
             pass.forward(simd, directions);
-            {
-                let rgb = flat::<S>(pass.rgb);
-                let (gradients, weights) = (flat_mut::<S>(gradients), flat_mut::<S>(weights));
-                // idle lanes of a short block count nothing
-                gradients.fill(0.0);
-                weights.fill(0.0);
-                for i in 0..directions.len() {
-                    let p = [0, 1, 2].map(|c| rgb[c * lanes + i] + folded.log_exposure);
-                    let local = loss(b * lanes + i, p);
-                    sums.loss += local.loss;
-                    for c in 0..3 {
-                        gradients[c * lanes + i] = local.gradient[c];
-                        weights[c * lanes + i] = local.weight[c];
-                    }
-                }
-            }
+            let (first, count) = (b * lanes, directions.len());
+            block.ask(loss, first, count, pass.rgb, folded.log_exposure, &mut sums.loss);
             for c in 0..3 {
-                let jacobian = rows.of_colour(simd, &mut pass, c);
-                for ((weighted, row), sum) in weighted.iter_mut().zip(jacobian).zip(&mut *gradient) {
-                    for v in 0..VECTORS {
-                        weighted[v] = simd.mul_f32s(row[v], weights[c][v]);
-                    }
-                    *sum = accumulate_product(simd, *sum, row, &gradients[c]);
-                }
-                outer::transpose::<S>(weighted, transposed);
-                outer::add(simd, jacobian, transposed, matrix);
+                block.add(simd, c, rows.of_colour(simd, &mut pass, c), gradient, matrix);
             }
         }
         for (sum, vector) in sums.gradient.iter_mut().zip(gradient) {
