@@ -54,7 +54,7 @@ pub use veni_light::{Error, Result};
 pub use budget::{Budget, Claim};
 pub use colour::{LUMINANCE, luminance};
 pub use panorama::{DARK_SHARE, LOG_FLOOR, Panorama, without_zeros};
-pub use picture::{Picture, read_mask};
+pub use picture::{Picture, read_mask, read_mask_with};
 pub use provenance::{PIXEL_DIGEST, Provenance};
 pub use read::{
     Content, DEFAULT_MAX_PIXELS, LdrPanorama, METADATA, Metadata, ReadOptions, Transfer, Treatment,

@@ -125,14 +125,22 @@ impl Picture {
     }
 }
 
-/// A mask from a file: white is 1, black 0, and what is transparent or not a number is 0 too. PNG, JPEG, WebP as display values; EXR and
-/// Radiance as they stand. Returns `[W, H]` and one value per pixel, row-major, from 0 to 1.
+/// [`read_mask_with`] without wishes; any width and height.
 ///
 /// # Errors
-/// As [`Picture::read`]; [`Error::Invalid`] if the largest display value is the smallest above black, as of truth values (0 and 1)
-/// that were saved as they are: such a mask has no white.
+/// As [`read_mask_with`].
 pub fn read_mask(path: impl AsRef<Path>) -> Result<([usize; 2], Vec<f32>)> {
-    let options = ReadOptions { data: true, ..any_aspect() };
+    read_mask_with(path, &any_aspect())
+}
+
+/// A mask from a file: white is 1, black 0, and what is transparent or not a number is 0 too. PNG, JPEG, WebP as display values; EXR and
+/// Radiance as they stand, [`ReadOptions::data`] or not. Returns `[W, H]` and one value per pixel, row-major, from 0 to 1.
+///
+/// # Errors
+/// As [`Picture::read_with`]; [`Error::Invalid`] if the largest display value is the smallest above black, as of truth values (0 and
+/// 1) that were saved as they are: such a mask has no white.
+pub fn read_mask_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<([usize; 2], Vec<f32>)> {
+    let options = ReadOptions { data: true, ..options.clone() };
     let path = path.as_ref();
     let (grid, values, alpha) = match Content::read(path, &options)? {
         Content::Display(image) => {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use veni_image::{
     HalfRange, Panorama, Picture, Precision, ReadOptions, WriteFormat, WriteOptions, attributes, peak_bytes,
-    read_mask,
+    read_mask_with,
 };
 use veni_light::sphere::Equirect;
 
@@ -35,10 +35,8 @@ fn header(path: &Path) -> bool {
     attributes(path).is_ok() && peak_bytes(path, &options()).is_ok_and(|bytes| bytes.is_some())
 }
 
-/// What the declared size allows: masks and pictures have no limit of their own.
 fn mask(path: &Path) -> bool {
-    let small = peak_bytes(path, &options()).is_ok_and(|bytes| bytes.is_some());
-    small && read_mask(path).is_ok() && Picture::read(path).is_ok()
+    read_mask_with(path, &options()).is_ok() && Picture::read_with(path, &options()).is_ok()
 }
 
 fn sky() -> Panorama {
