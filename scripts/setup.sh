@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what the tests need beyond Rust. Debian and Ubuntu are served; elsewhere it says what to install.
-#   scripts/setup.sh [--tools] [--targets TARGET…]    also typos and cargo-deny, and the standard library of other targets
-#                                                     (.ci/run)
+#   scripts/setup.sh [--tools] [--targets TARGET…]    also typos and, with VENI_TOOLS=1, cargo-deny; and the standard library of
+#                                                     other targets (.ci/run)
 set -euo pipefail
 
 # A C compiler links Rust programs; criterion and the command line need nothing else.
@@ -37,14 +37,17 @@ if ! command -v cargo >/dev/null; then
     exit 1
 fi
 
-# Spelling, licences and advisories. Once built they stay in cargo's folder; without the registry CI says what it leaves out.
+# Spelling: typos as its makers publish it for Python, a program that comes built, in target/tools. Advisories: cargo-deny takes
+# minutes to build, and stays in cargo's folder. CI says what it leaves out where one cannot be had.
 if [[ ${1:-} == --tools ]]; then
     shift
-    missing=()
-    command -v typos >/dev/null || missing+=(typos-cli)
-    cargo deny --version >/dev/null 2>&1 || missing+=(cargo-deny)
-    if ((${#missing[@]})) && [[ ${VENI_SKIP_TOOLS:-0} != 1 ]]; then
-        cargo install --locked --quiet "${missing[@]}" || echo "setup: cannot be installed now: ${missing[*]}" >&2
+    tools=${CARGO_TARGET_DIR:-target}/tools
+    if ! command -v typos >/dev/null && [[ ! -x $tools/bin/typos && ${VENI_SKIP_TOOLS:-0} != 1 ]]; then
+        { python3 -m venv "$tools" && "$tools/bin/pip" install --quiet --disable-pip-version-check typos==1.52.0; } >&2 ||
+            echo "setup: typos cannot be installed now (it takes python3 with venv)" >&2
+    fi
+    if [[ ${VENI_TOOLS:-0} == 1 ]] && ! cargo deny --version >/dev/null 2>&1; then
+        cargo install --locked --quiet cargo-deny || echo "setup: cargo-deny cannot be installed now" >&2
     fi
 fi
 

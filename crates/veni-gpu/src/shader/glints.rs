@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn harmonics_of_discs_are_the_librarys() {
+    fn harmonics_of_discs_are_those_of_the_library() {
         let lights = [Lights::default(), Lights::new(Some(light(0.004_65)), [light(0.02)])];
         let packed = pack_light_harmonics(12, &lights);
         assert_eq!(packed.len(), 2 * 169);
