@@ -37,7 +37,8 @@ fn the_sun_is_where_it_is_asked_to_be_and_lights_as_asked() {
         let (sun_text, share) = (format!("{},{}", sun[0], sun[1]), overcast.to_string());
         let asked = ["--sun", &sun_text, "--overcast", &share];
         let out = format!("{seed}.exr");
-        let said = only(dir.json(&[&["bake", "--seed", seed, "-o", &out], &asked[..]].concat()));
+        let said =
+            only(dir.json(&[&["bake", "--seed", seed, "-o", &out, "--size", "512"], &asked[..]].concat()));
         assert!((number(&said["asked"], "azimuth") - sun[0]).abs() < 1e-9, "{said}");
         // the file itself, by the command that measures any panorama
         let light = only(dir.json(&["light", &out]));
@@ -49,7 +50,7 @@ fn the_sun_is_where_it_is_asked_to_be_and_lights_as_asked() {
         let text = said["latent"]["source"].as_str().unwrap();
         assert!(text.contains(&format!("seed {seed}, sun at")) && text.contains("overcast"), "{text}");
     }
-    let said = dir.ok(&["bake", "--seed", "7", "-o", "warm.exr", "--temperature", "4500"]);
+    let said = dir.ok(&["bake", "--seed", "7", "-o", "warm.exr", "--size", "512", "--temperature", "4500"]);
     let kelvin = kelvins(&said, " K (");
     assert!((kelvin / 4500.0 - 1.0).abs() < 0.1, "{said}");
     // `light` measures the file, whose floats are of half precision

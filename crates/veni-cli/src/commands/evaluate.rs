@@ -247,7 +247,7 @@ impl Evaluate {
         let (store, figures) = (Store::new(&self.out), self.out.join("figures"));
         let settings =
             Settings { seed: self.seed, quick: self.quick, pairs: self.pairs, frames: self.frames };
-        let bases = inputs::bases(&self.baselines, &subjects)?;
+        let bases = inputs::bases(&self.baselines, &subjects, self.quick)?;
         let others: Vec<&dyn Codec> = bases.iter().map(|basis| basis as &dyn Codec).collect();
         let evaluation = Evaluation {
             subjects: &subjects,

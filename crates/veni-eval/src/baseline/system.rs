@@ -70,6 +70,16 @@ impl Baseline {
         })
     }
 
+    /// With this search for its lobes, if it has any.
+    #[must_use]
+    pub fn searched(mut self, by: Search) -> Self {
+        match &mut self {
+            Self::SphericalHarmonics { .. } => {}
+            Self::SphericalGaussians { search, .. } | Self::GaussianMixture { search, .. } => *search = by,
+        }
+        self
+    }
+
     /// Numbers that a fit of this system consists of.
     pub fn dimension(&self) -> usize {
         match *self {

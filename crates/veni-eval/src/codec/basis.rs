@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use super::Codec;
+use crate::baseline::gaussians::Search;
 use crate::baseline::{Baseline, Fitted, Kind, Space};
 use crate::canonical::Canonical;
 use crate::{Error, Result};
@@ -16,12 +17,14 @@ pub struct Basis {
 }
 
 impl Basis {
-    /// The largest system of this kind, in log radiance, of at most `dimension` coefficients.
+    /// The largest system of this kind, in log radiance, of at most `dimension` coefficients; `quick`: lobes are searched by
+    /// [`Search::quick`].
     ///
     /// # Errors
     /// As [`Baseline::from_dimension`].
-    pub fn new(kind: Kind, dimension: usize) -> Result<Self> {
+    pub fn new(kind: Kind, dimension: usize, quick: bool) -> Result<Self> {
         let system = Baseline::from_dimension(kind, dimension, Space::Log)?;
+        let system = if quick { system.searched(Search::quick()) } else { system };
         let name = match kind {
             Kind::SphericalHarmonics => "SH",
             Kind::SphericalGaussians => "SG",
@@ -79,7 +82,7 @@ mod tests {
         let grid = Equirect::new(16, 8);
         let sky: Vec<f32> = grid.directions().iter().flat_map(|d| [d[2], 0.5 * d[0], 1.0]).collect();
         for kind in [Kind::SphericalHarmonics, Kind::SphericalGaussians, Kind::GaussianMixture] {
-            let basis = Basis::new(kind, 27).unwrap();
+            let basis = Basis::new(kind, 27, false).unwrap();
             let code = basis.encode(grid, &sky).unwrap();
             assert_eq!((code.len(), basis.dimension()), (27, 27), "{kind:?}");
             let image = basis.decode(grid, &code).unwrap();
@@ -87,8 +90,11 @@ mod tests {
             assert!(worst < 0.3, "{kind:?}: {worst}");
         }
         assert_ne!(
-            Basis::new(Kind::SphericalHarmonics, 27).unwrap().key(),
-            Basis::new(Kind::SphericalHarmonics, 147).unwrap().key()
+            Basis::new(Kind::SphericalHarmonics, 27, false).unwrap().key(),
+            Basis::new(Kind::SphericalHarmonics, 147, false).unwrap().key()
         );
+        // what is kept of a quick search is not taken for the whole one's
+        let key = |quick| Basis::new(Kind::SphericalGaussians, 27, quick).unwrap().key();
+        assert_ne!(key(true), key(false));
     }
 }

@@ -171,7 +171,7 @@ impl Descent<'_> {
             Ok(QuadraticModel::new(found, latent.vectors.len(), free).plus(value, &by, &hessian))
         };
         let begin = |(b, latent): (usize, &Latent)| -> Result<Search> {
-            Ok(Search::new(latent.clone(), evaluate(latent, b)?))
+            Ok(Search::new(latent.clone(), evaluate(latent, b)?).with_progress(self.loss.progress()))
         };
         let mut searches = start.iter().enumerate().map(begin).collect::<Result<Vec<_>>>()?;
         for _ in 0..steps {

@@ -16,8 +16,8 @@ const DAMPING: f64 = 1e-2;
 const MOST_DAMPING: f64 = 1e8;
 /// Least diagonal element of D, in parts of the largest: coordinates that hardly matter stay where they are.
 const FLOOR: f64 = 1e-6;
-/// A fall of the loss by less than this fraction is not progress, and N of them in a row end the search.
-const PROGRESS: f64 = 1e-4;
+/// A fall of the loss by less than this fraction is not progress, unless a search is told otherwise, and N of them in a row end it.
+pub(super) const PROGRESS: f64 = 1e-4;
 const PATIENCE: u32 = 3;
 
 /// The local quadratic of the loss at a latent, prior included: over the coordinates that may move.
@@ -102,6 +102,8 @@ pub(super) struct Search {
     damping: f64,
     growth: f64,
     idle: u32,
+    /// A fall by less than this fraction is not progress.
+    progress: f64,
     /// The least and the largest of a lobe.
     sharpness: [f32; 2],
 }
@@ -109,7 +111,12 @@ pub(super) struct Search {
 impl Search {
     pub(super) fn new(latent: Latent, at: QuadraticModel) -> Self {
         let sharpness = [f32::MIN_POSITIVE, f32::MAX];
-        Self { latent, at, damping: DAMPING, growth: 2.0, idle: 0, sharpness }
+        Self { latent, at, damping: DAMPING, growth: 2.0, idle: 0, progress: PROGRESS, sharpness }
+    }
+
+    /// For which a fall of the loss by less than this fraction is not progress.
+    pub(super) fn with_progress(self, progress: f64) -> Self {
+        Self { progress, ..self }
     }
 
     /// With lobes of sharpnesses from `least` to `largest`.
@@ -144,7 +151,7 @@ impl Search {
             self.shorten();
             return Ok(());
         }
-        self.idle = if gain < PROGRESS * self.at.value { self.idle + 1 } else { 0 };
+        self.idle = if gain < self.progress * self.at.value { self.idle + 1 } else { 0 };
         let ratio = gain / fall;
         self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
         self.growth = 2.0;

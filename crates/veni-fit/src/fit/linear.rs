@@ -42,9 +42,9 @@ pub fn fit_linear(
     optimise(&network, &ImageLoss::Linear(target), prior, start, &config, observer)
 }
 
-/// [`fit_linear`] several times on end, under a prior whose weight falls to [`FitConfig::prior`]: of the latents with these
-/// integrals a likely one. Makes [`FitConfig::steps`] updates under each weight, at most; all but those under the last at half the
-/// resolution.
+/// [`fit_linear`] several times on end, [`likely_searches`] of them, under a prior whose weight falls to [`FitConfig::prior`]: of the
+/// latents with these integrals a likely one. The weight falls at the coarsest resolution, of 16 rows or a little more; under the
+/// last one the search goes on at twice that, and again up to the target's own. Each makes [`FitConfig::steps`] updates at most.
 ///
 /// # Errors
 /// As [`fit_linear`].
@@ -57,9 +57,9 @@ pub fn likely_linear(
     observer: &mut dyn FnMut(u64, f64),
 ) -> Result<FitResult> {
     let mut all = FitResult { latents: start.to_vec(), losses: Vec::new(), last: Vec::new() };
-    let coarse = target.coarser();
-    for factor in FALL {
-        let target = coarse.as_ref().filter(|_| factor > 1.0).unwrap_or(target);
+    let levels = target.levels();
+    let falling = FALL.into_iter().map(|factor| (factor, &levels[0]));
+    for (factor, target) in falling.chain(levels[1..].iter().map(|level| (1.0, level))) {
         let config = FitConfig { prior: factor * config.prior, ..*config };
         let before = all.losses.len() as u64;
         let mut observer = |step, loss| observer(before + step, loss);
@@ -68,4 +68,9 @@ pub fn likely_linear(
         all.losses.extend(found.losses);
     }
     Ok(all)
+}
+
+/// How often [`likely_linear`] searches for a target.
+pub fn likely_searches(target: &LinearTarget) -> u64 {
+    (FALL.len() + target.levels().len() - 1) as u64
 }

@@ -12,7 +12,7 @@ use crate::{Error, Result};
 const RANGE: std::ops::RangeInclusive<f64> = 1e-20..=1e20;
 
 /// Rows that show a light well enough for a search to begin.
-const COARSEST: usize = 32;
+const COARSEST: usize = 16;
 
 /// Integrals of light that a latent is to have, each a weighted sum of radiance over the pixels of a grid.
 ///
@@ -202,6 +202,13 @@ impl LinearTarget {
             sums.iter_mut().zip(own).for_each(|(sum, w)| *sum += w);
         }
         Some(Self { grid, weights, terms: self.terms.clone(), ..*self })
+    }
+
+    /// This target and those at a half, a quarter … of its resolution, the coarsest first.
+    pub(crate) fn levels(&self) -> Vec<Self> {
+        let mut levels: Vec<_> = std::iter::successors(Some(self.clone()), Self::coarser).collect();
+        levels.reverse();
+        levels
     }
 
     /// Whether nothing is wanted.

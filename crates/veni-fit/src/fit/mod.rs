@@ -22,7 +22,7 @@ mod tests;
 
 pub use config::{FitConfig, Method, Objective, Plateau};
 pub use decoder::{DecoderPasses, LatentDecoder, LatentGradient, PanoramaLoss};
-pub use linear::{fit_linear, likely_linear};
+pub use linear::{fit_linear, likely_linear, likely_searches};
 pub use linear_target::{Achieved, LinearTarget, Received};
 pub use lobes::{LobePlan, WIDEST_LIGHT, fit_lobes};
 pub use rendered::{fit_rendered, matching_exposure};

@@ -4,6 +4,7 @@ use veni_light::field::{LocalQuadratic, NormalEquations};
 use veni_light::latent::Latent;
 
 use super::decoder::{DecoderPasses, FoldedPasses, LatentDecoder, LatentGradient, PanoramaLoss};
+use super::levenberg_marquardt::PROGRESS;
 use super::linear_target::LinearTarget;
 use super::pixel::PixelLoss;
 use crate::shade::RenderedImage;
@@ -27,6 +28,12 @@ impl ImageLoss<'_> {
     /// Whether there are normal equations of each latent, given a decoder that folds.
     pub(crate) fn has_equations(&self) -> bool {
         matches!(self, Self::Pixels(_) | Self::Linear(_))
+    }
+
+    /// A fall of the loss by less than this fraction is not progress. What is left of an integral's loss is the prior's, along a
+    /// valley that need not be followed to its end.
+    pub(super) fn progress(&self) -> f64 {
+        if matches!(self, Self::Linear(_)) { 10.0 * PROGRESS } else { PROGRESS }
     }
 }
 

@@ -75,7 +75,7 @@ pub(super) fn subjects(
 }
 
 /// The bases asked for, of each size that a model has.
-pub(super) fn bases(names: &[BaselineName], subjects: &[LoadedModel]) -> Result<Vec<Basis>> {
+pub(super) fn bases(names: &[BaselineName], subjects: &[LoadedModel], quick: bool) -> Result<Vec<Basis>> {
     // with one light where there are lobes, as the sizes of codes inside the program are counted
     let size = |subject: &LoadedModel| match subject.lobes() {
         0 => subject.dimension(),
@@ -93,7 +93,7 @@ pub(super) fn bases(names: &[BaselineName], subjects: &[LoadedModel]) -> Result<
             BaselineName::Mixture => Kind::GaussianMixture,
         };
         for size in &sizes {
-            bases.push(Basis::new(kind, *size)?);
+            bases.push(Basis::new(kind, *size, quick)?);
         }
     }
     Ok(bases)

@@ -7,7 +7,9 @@ use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use veni_fit::targets::{read_harmonics, read_surfaces};
-use veni_fit::{Achieved, Best, FitConfig, LinearTarget, Received, best_linear, random_starts};
+use veni_fit::{
+    Achieved, Best, FitConfig, LinearTarget, Received, best_linear, likely_searches, random_starts,
+};
 use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
 
@@ -159,8 +161,9 @@ impl Integrals {
     ) -> Result<Best> {
         let (prior, vectors) = (model.prior(), model.latent_vectors());
         let progress = ProgressBars::new(report);
-        // the first start is led by four weights of the prior
-        progress.begin("", "step", Some(config.most_updates(vectors) * (starts.len() as u64 + 3)));
+        // the first start is led by weights of the prior and by resolutions
+        let searches = likely_searches(target) + starts.len() as u64 - 1;
+        progress.begin("", "step", Some(config.most_updates(vectors) * searches));
         let mut observer = |step, loss| progress.advance(step, &format!("loss {loss:.6}"));
         let best = best_linear(model.decoder(), target, &prior, starts, config, &mut observer);
         progress.end();

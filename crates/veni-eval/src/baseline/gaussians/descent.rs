@@ -29,6 +29,13 @@ impl Default for Search {
     }
 }
 
+impl Search {
+    /// A single start of 50 steps: to see a trend.
+    pub fn quick() -> Self {
+        Self { starts: 1, steps: 50, ..Self::default() }
+    }
+}
+
 /// A loss of free numbers, the first of which are the [shapes](shape).
 pub(super) trait Problem {
     /// All free numbers for given shapes.
