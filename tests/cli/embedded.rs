@@ -49,7 +49,7 @@ fn a_photograph_stands_upright_as_its_exif_data_says() {
             "--starts",
             "1",
             "--steps",
-            "60",
+            "25",
             "--prior",
             "1",
             "--resolution",
