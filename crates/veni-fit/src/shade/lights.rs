@@ -1,7 +1,7 @@
 //! Sets of distant lights.
 
 use super::icosahedron;
-use super::vector::unit_f32;
+use super::unit::unit_f32;
 use crate::{Error, Result};
 use veni_light::sphere::{Equirect, reference};
 

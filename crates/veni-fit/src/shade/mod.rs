@@ -33,7 +33,7 @@ mod material;
 mod raster;
 mod surface;
 mod transfer;
-mod vector;
+mod unit;
 
 #[cfg(test)]
 mod tests;

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::kernel::{self, LANES, ROWS};
 use super::material::{Lobes, REFERENCE_FLOOR};
-use super::vector::wide;
 use super::{Colour, Lights, Material, ShadingForm, Surface};
 use crate::{Error, Result};
+use veni_light::vector::wide;
 
 /// The memory that [`Transfer::new`] may take for its matrix: 512 MiB.
 pub const DEFAULT_MEMORY: usize = 512 << 20;

@@ -11,6 +11,7 @@ pub use descent::Search;
 
 use super::target::Target;
 use crate::Result;
+use veni_light::vector::dot;
 
 /// One lobe, a e^{λ(⟨μ,d⟩ − 1)}. It counts as six numbers: two for the axis, one for the sharpness, three for the colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,10 +62,6 @@ impl Gaussians {
     pub(super) fn fit_mixture(lobes: usize, target: &Target, search: &Search) -> Result<Self> {
         search.run(&mixture::Mixture::new(lobes, target))
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]
