@@ -2,7 +2,7 @@
 
 use super::gaussians::{Gaussians, Lobe};
 use super::harmonics::Harmonics;
-use super::{Baseline, Space};
+use super::{Baseline, TargetSpace};
 use crate::{Error, Result};
 
 /// Where an expansion of radiance itself falls below this share of its own mean over the sphere, it is held there: such
@@ -22,7 +22,7 @@ pub enum Field {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fitted {
     /// What the field is an expansion of.
-    pub space: Space,
+    pub space: TargetSpace,
     /// The field.
     pub field: Field,
 }
@@ -38,8 +38,8 @@ impl Fitted {
         };
         let floor = mean.map(|m| (FLOOR * m).max(f64::from(f32::MIN_POSITIVE)));
         let log = |v: [f64; 3]| match self.space {
-            Space::Log => v.map(|v| v as f32),
-            Space::Linear => [0, 1, 2].map(|c| v[c].max(floor[c]).ln() as f32),
+            TargetSpace::Log => v.map(|v| v as f32),
+            TargetSpace::Linear => [0, 1, 2].map(|c| v[c].max(floor[c]).ln() as f32),
         };
         values.into_iter().map(log).collect()
     }

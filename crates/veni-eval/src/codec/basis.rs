@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::Codec;
 use crate::baseline::gaussians::Search;
-use crate::baseline::{Baseline, Fitted, Kind, Space};
+use crate::baseline::{Baseline, Fitted, Kind, TargetSpace};
 use crate::canonical::Canonical;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
@@ -23,7 +23,7 @@ impl Basis {
     /// # Errors
     /// As [`Baseline::from_dimension`].
     pub fn new(kind: Kind, dimension: usize, quick: bool) -> Result<Self> {
-        let system = Baseline::from_dimension(kind, dimension, Space::Log)?;
+        let system = Baseline::from_dimension(kind, dimension, TargetSpace::Log)?;
         let system = if quick { system.searched(Search::quick()) } else { system };
         let name = match kind {
             Kind::SphericalHarmonics => "SH",

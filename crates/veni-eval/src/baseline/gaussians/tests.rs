@@ -2,7 +2,7 @@ use super::descent::Problem;
 use super::mixture::Mixture;
 use super::separable::Separable;
 use super::*;
-use crate::baseline::Space;
+use crate::baseline::TargetSpace;
 use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
@@ -34,10 +34,10 @@ fn check_gradient(problem: &impl Problem) {
 #[test]
 fn gradients_agree_with_finite_differences() {
     let grid = Equirect::new(12, 6);
-    for space in [Space::Log, Space::Linear] {
+    for space in [TargetSpace::Log, TargetSpace::Linear] {
         check_gradient(&Separable::new(3, &Target::new(grid, &image(grid), space).unwrap()));
     }
-    check_gradient(&Mixture::new(3, &Target::new(grid, &image(grid), Space::Log).unwrap()));
+    check_gradient(&Mixture::new(3, &Target::new(grid, &image(grid), TargetSpace::Log).unwrap()));
 }
 
 #[test]
@@ -52,7 +52,7 @@ fn lobes_are_found_again() {
     };
     let directions: Vec<_> = grid.directions().into_iter().map(|d| d.map(f64::from)).collect();
     let image: Vec<f32> = truth.values(&directions).as_flattened().iter().map(|v| *v as f32).collect();
-    let target = Target::new(grid, &image, Space::Log).unwrap();
+    let target = Target::new(grid, &image, TargetSpace::Log).unwrap();
     let found = Gaussians::fit(2, &target, &Search::default()).unwrap();
     for (a, b) in found.values(&directions).as_flattened().iter().zip(&image) {
         assert!((a - f64::from(*b)).abs() < 1e-2, "{found:?}");
@@ -71,7 +71,7 @@ fn the_mean_is_the_integral() {
         constant: [0.5, 0.0, 1.0],
     };
     let grid = Equirect::new(128, 64);
-    let target = Target::new(grid, &vec![0.0; 3 * grid.len()], Space::Log).unwrap();
+    let target = Target::new(grid, &vec![0.0; 3 * grid.len()], TargetSpace::Log).unwrap();
     let sum = |c: usize| -> f64 {
         field.values(&target.directions).iter().zip(&target.weights).map(|(v, w)| w * v[c]).sum()
     };
