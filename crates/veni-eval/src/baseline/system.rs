@@ -1,6 +1,6 @@
 //! Which system, of which size.
 
-use super::fitted::{Field, Fitted};
+use super::fitted::{BaselineField, Fitted};
 use super::gaussians::{Gaussians, Search};
 use super::harmonics::Harmonics;
 use super::target::{Target, TargetSpace};
@@ -9,7 +9,7 @@ use veni_light::sphere::Equirect;
 
 /// A family of systems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum BaselineKind {
     /// [`Baseline::SphericalHarmonics`].
     SphericalHarmonics,
     /// [`Baseline::SphericalGaussians`].
@@ -54,7 +54,7 @@ impl Baseline {
     ///
     /// # Errors
     /// [`Error::Invalid`] if not even a constant fits into `dimension`.
-    pub fn from_dimension(kind: Kind, dimension: usize, space: TargetSpace) -> Result<Self> {
+    pub fn from_dimension(kind: BaselineKind, dimension: usize, space: TargetSpace) -> Result<Self> {
         if dimension < 3 {
             return Err(Error::invalid(format!(
                 "a baseline of dimension {dimension}: a constant colour already takes 3"
@@ -62,11 +62,11 @@ impl Baseline {
         }
         let (lobes, search) = ((dimension - 3) / 6, Search::default());
         Ok(match kind {
-            Kind::SphericalHarmonics => {
+            BaselineKind::SphericalHarmonics => {
                 Self::SphericalHarmonics { order: (dimension / 3).isqrt() - 1, space }
             }
-            Kind::SphericalGaussians => Self::SphericalGaussians { lobes, space, search },
-            Kind::GaussianMixture => Self::GaussianMixture { lobes, search },
+            BaselineKind::SphericalGaussians => Self::SphericalGaussians { lobes, space, search },
+            BaselineKind::GaussianMixture => Self::GaussianMixture { lobes, search },
         })
     }
 
@@ -105,13 +105,13 @@ impl Baseline {
         let target = |space| Target::new(grid, log_radiance, space);
         let field = match self {
             Self::SphericalHarmonics { order, space } => {
-                Field::Harmonics(Harmonics::fit(*order, &target(*space)?)?)
+                BaselineField::Harmonics(Harmonics::fit(*order, &target(*space)?)?)
             }
             Self::SphericalGaussians { lobes, space, search } => {
-                Field::Gaussians(Gaussians::fit(*lobes, &target(*space)?, search)?)
+                BaselineField::Gaussians(Gaussians::fit(*lobes, &target(*space)?, search)?)
             }
             Self::GaussianMixture { lobes, search } => {
-                Field::Gaussians(Gaussians::fit_mixture(*lobes, &target(TargetSpace::Log)?, search)?)
+                BaselineField::Gaussians(Gaussians::fit_mixture(*lobes, &target(TargetSpace::Log)?, search)?)
             }
         };
         Ok(Fitted { space: self.space(), field })

@@ -1,5 +1,5 @@
-use super::fitted::{FLOOR, Field};
-use super::gaussians::{Gaussians, Lobe};
+use super::fitted::{BaselineField, FLOOR};
+use super::gaussians::{Gaussians, SphericalGaussian};
 use super::harmonics::Harmonics;
 use super::*;
 use veni_light::sphere::Equirect;
@@ -23,12 +23,12 @@ fn error(fitted: &Fitted, grid: Equirect, image: &[f32]) -> f64 {
 fn a_dimension_is_spent_as_said() {
     let made = |kind, d| Baseline::from_dimension(kind, d, TargetSpace::Log).unwrap();
     for (d, order, lobes, spent) in [(3, 0, 0, 3), (27, 2, 4, 27), (147, 6, 24, 147), (300, 9, 49, 297)] {
-        let harmonics = made(Kind::SphericalHarmonics, d);
+        let harmonics = made(BaselineKind::SphericalHarmonics, d);
         assert_eq!(
             (harmonics, harmonics.dimension()),
             (Baseline::SphericalHarmonics { order, space: TargetSpace::Log }, d)
         );
-        for kind in [Kind::SphericalGaussians, Kind::GaussianMixture] {
+        for kind in [BaselineKind::SphericalGaussians, BaselineKind::GaussianMixture] {
             let (Baseline::SphericalGaussians { lobes: k, .. } | Baseline::GaussianMixture { lobes: k, .. }) =
                 made(kind, d)
             else {
@@ -38,7 +38,7 @@ fn a_dimension_is_spent_as_said() {
         }
     }
     assert!(
-        Baseline::from_dimension(Kind::GaussianMixture, 2, TargetSpace::Log)
+        Baseline::from_dimension(BaselineKind::GaussianMixture, 2, TargetSpace::Log)
             .unwrap_err()
             .to_string()
             .contains('2')
@@ -49,7 +49,9 @@ fn a_dimension_is_spent_as_said() {
 fn every_system_improves_with_its_size_and_counts_its_coefficients() {
     let grid = Equirect::new(32, 16);
     let image = sky(grid);
-    for kind in [Kind::SphericalHarmonics, Kind::SphericalGaussians, Kind::GaussianMixture] {
+    for kind in
+        [BaselineKind::SphericalHarmonics, BaselineKind::SphericalGaussians, BaselineKind::GaussianMixture]
+    {
         let fit = |d| {
             let baseline = Baseline::from_dimension(kind, d, TargetSpace::Log).unwrap();
             let fitted = baseline.fit(grid, &image).unwrap();
@@ -64,8 +66,10 @@ fn every_system_improves_with_its_size_and_counts_its_coefficients() {
 #[test]
 fn harmonics_are_their_own_best_fit_whatever_the_grid() {
     let coefficients: Vec<_> = (0..9).map(|k| [0.3 * f64::from(k), 1.0 - 0.1 * f64::from(k), 0.2]).collect();
-    let truth =
-        Fitted { space: TargetSpace::Log, field: Field::Harmonics(Harmonics::new(coefficients).unwrap()) };
+    let truth = Fitted {
+        space: TargetSpace::Log,
+        field: BaselineField::Harmonics(Harmonics::new(coefficients).unwrap()),
+    };
     // coarse and lopsided: a plain projection is off by percents here
     let grid = Equirect::new(9, 7);
     let image = truth.log_radiance(&grid.directions()).into_flattened();
@@ -95,11 +99,11 @@ fn a_rotated_image_has_the_rotated_fit() {
 #[test]
 fn the_floor_holds_what_has_no_logarithm() {
     let field = Gaussians {
-        lobes: vec![Lobe { axis: [0.0, 0.0, 1.0], sharpness: 1.0, amplitude: [-2.0; 3] }],
+        lobes: vec![SphericalGaussian { axis: [0.0, 0.0, 1.0], sharpness: 1.0, amplitude: [-2.0; 3] }],
         constant: [1.0; 3],
     };
     let mean = field.mean()[0];
-    let fitted = Fitted { space: TargetSpace::Linear, field: Field::Gaussians(field) };
+    let fitted = Fitted { space: TargetSpace::Linear, field: BaselineField::Gaussians(field) };
     let [up, down] = fitted.log_radiance(&[[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])[..] else { panic!() };
     assert!((f64::from(up[0]) - (FLOOR * mean).ln()).abs() < 1e-6);
     assert!((f64::from(down[0]) - (1.0 - 2.0 * (-2.0_f64).exp()).ln()).abs() < 1e-6);
@@ -135,7 +139,9 @@ fn parameters_say_everything_about_a_fit() {
     let grid = Equirect::new(16, 8);
     let sky: Vec<f32> = grid.directions().iter().flat_map(|d| [d[2], 0.5 * d[0] * d[1], 1.0]).collect();
     let directions = grid.directions();
-    for kind in [Kind::SphericalHarmonics, Kind::SphericalGaussians, Kind::GaussianMixture] {
+    for kind in
+        [BaselineKind::SphericalHarmonics, BaselineKind::SphericalGaussians, BaselineKind::GaussianMixture]
+    {
         let system = Baseline::from_dimension(kind, 27, TargetSpace::Log).unwrap();
         let fitted = system.fit(grid, &sky).unwrap();
         let again = Fitted::from_parameters(&system, &fitted.parameters()).unwrap();

@@ -2,7 +2,7 @@
 //! shapes are searched (variable projection; Golub & Pereyra 1973). MODEL (48).
 
 use super::descent::Problem;
-use super::{Gaussians, Lobe, shape};
+use super::{Gaussians, SphericalGaussian, shape};
 use crate::baseline::least_squares;
 use crate::baseline::target::Target;
 use veni_light::vector::dot;
@@ -65,7 +65,9 @@ impl Problem for Separable<'_> {
         let best = self.amplitudes(&shape::matrix(x, &self.target.directions));
         let lobes = shape::lobes(x).zip(&best);
         Gaussians {
-            lobes: lobes.map(|((axis, sharpness), a)| Lobe { axis, sharpness, amplitude: *a }).collect(),
+            lobes: lobes
+                .map(|((axis, sharpness), a)| SphericalGaussian { axis, sharpness, amplitude: *a })
+                .collect(),
             constant: best[self.lobes],
         }
     }

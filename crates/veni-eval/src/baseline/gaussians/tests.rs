@@ -45,8 +45,8 @@ fn lobes_are_found_again() {
     let grid = Equirect::new(32, 16);
     let truth = Gaussians {
         lobes: vec![
-            Lobe { axis: [0.6, 0.0, 0.8], sharpness: 12.0, amplitude: [2.0, 1.5, 1.0] },
-            Lobe { axis: [0.0, -0.8, -0.6], sharpness: 3.0, amplitude: [-1.0, 0.3, 0.5] },
+            SphericalGaussian { axis: [0.6, 0.0, 0.8], sharpness: 12.0, amplitude: [2.0, 1.5, 1.0] },
+            SphericalGaussian { axis: [0.0, -0.8, -0.6], sharpness: 3.0, amplitude: [-1.0, 0.3, 0.5] },
         ],
         constant: [0.1, 0.2, -0.3],
     };
@@ -65,7 +65,7 @@ fn lobes_are_found_again() {
 
 #[test]
 fn the_mean_is_the_integral() {
-    let lobe = |axis, sharpness| Lobe { axis, sharpness, amplitude: [1.0, -2.0, 0.5] };
+    let lobe = |axis, sharpness| SphericalGaussian { axis, sharpness, amplitude: [1.0, -2.0, 0.5] };
     let field = Gaussians {
         lobes: vec![lobe([0.0, 0.6, 0.8], 0.2), lobe([1.0, 0.0, 0.0], 25.0)],
         constant: [0.5, 0.0, 1.0],
