@@ -23,7 +23,7 @@ pub use veni_light::*;
 mod in_every_build {
     use crate::{
         cholesky, digest, error, field, latent, light, limits, model, output, progress, random, skies,
-        sphere, text,
+        sphere, text, vector,
     };
 }
 

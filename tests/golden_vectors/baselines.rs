@@ -5,7 +5,7 @@ use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared};
 use burn::tensor::Device;
 use veni::eval::baseline::Adam;
-use veni::eval::baseline::gaussians::reference::Grid;
+use veni::eval::baseline::gaussians::reference::LobeGrid;
 use veni::eval::baseline::harmonics::{Basis, reference};
 use veni::sphere::Equirect;
 use veni::sphere::reference::decoder_directions;
@@ -76,9 +76,9 @@ fn harmonics_image(case: &Case) {
 }
 
 /// The files give rows and columns by what they are, not by the reference's option.
-fn gaussian_grid(case: &Case) -> Grid {
+fn gaussian_grid(case: &Case) -> LobeGrid {
     let [columns, rows] = ["cols", "rows"].map(|n| case.size(n).expect("a size of the grid"));
-    Grid::from_row_col_gaussian_dims([columns, rows])
+    LobeGrid::from_row_col_gaussian_dims([columns, rows])
 }
 
 /// The recorded start is the one that the reference form documents.

@@ -4,7 +4,7 @@ use crate::case::Case;
 use crate::{Outcome, Outcome::Compared};
 use burn::tensor::{Device, Tensor};
 use veni::train::loss::mage::{self, Operator};
-use veni::train::loss::stencil::{Coarsen, Edge, Filter, Grid, REFERENCE_VERTICAL, SCHARR_HORIZONTAL};
+use veni::train::loss::stencil::{Coarsen, Edge, Filter, REFERENCE_VERTICAL, SCHARR_HORIZONTAL, StencilGrid};
 use veni::train::loss::{Loss, LossConfig, LossForm, cosine, kld, mse, rows, scale_invariant};
 use veni::train::schedule::WeightSchedule;
 
@@ -105,7 +105,7 @@ fn mage_pieces(case: &Case, device: &Device) {
     let target = planes(case.tensor::<4>("in.target", device));
     for name in case.tensors.keys().filter_map(|n| n.strip_prefix("out.")) {
         let prediction = case.tensor::<4>("in.pred", device).require_grad();
-        let grid = Grid {
+        let grid = StencilGrid {
             size: [height, width],
             channels: 1,
             factor: 1,

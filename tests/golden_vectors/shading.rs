@@ -5,8 +5,8 @@ use crate::case::{Case, Data};
 use crate::{Outcome, Outcome::Compared, Outcome::Elsewhere, Outcome::Skipped, double, field};
 use burn::tensor::{Device, Tensor};
 use veni::shade::{
-    Camera, Colour, ExposureForm, Lights, Material, RenderedImage, RenderingLoss, ShadingForm, Specular,
-    Surface, Transfer,
+    Camera, Colour, DistantLights, ExposureForm, Material, RenderedImage, RenderingLoss, ShadingForm,
+    Specular, Surface, Transfer,
 };
 use veni::sphere::{Equirect, reference};
 
@@ -53,11 +53,11 @@ fn samplers(case: &Case) {
             Some((count, "upper")) => (count, true),
             _ => (&name["out.ico_".len()..], false),
         };
-        let lights = Lights::icosahedron(count.parse().expect("out.ico_<count>"), upper);
+        let lights = DistantLights::icosahedron(count.parse().expect("out.ico_<count>"), upper);
         compare(case, name, lights.directions());
     }
     let width = case.size("equirect_width").expect("the width of the equirectangular sampler");
-    compare(case, "out.equirect", Lights::reference(Equirect::new(width, width / 2)).directions());
+    compare(case, "out.equirect", DistantLights::reference(Equirect::new(width, width / 2)).directions());
 }
 
 /// Each of the points has lights of its own, so each is an image of one pixel.
@@ -79,7 +79,7 @@ fn shaders(case: &Case) {
             .map(|d| d.map(f64::from).iter().map(|c| c * c).sum::<f64>().sqrt() as f32)
             .collect();
         let shade = |weights: &[f32], material: Material| {
-            let lights = Lights::new(directions, weights).expect("lights");
+            let lights = DistantLights::new(directions, weights).expect("lights");
             Transfer::new(&surface, &material, lights, ShadingForm::Reference).expect("a transfer")
         };
         let (ones, white) = (vec![1.0; count], Colour::Uniform([1.0; 3]));
@@ -125,11 +125,11 @@ fn surface(case: &Case, rays: &str) -> Surface {
     Surface::new([size, size], &normals, &triples(case, rays), Some(&mask)).expect("a surface")
 }
 
-/// One light per pixel, along the recorded directions, which are those of [`Lights::reference`].
-fn lights(case: &Case) -> Lights {
-    compare(case, "in.light_directions", Lights::reference(grid(case, "in.env_log")).directions());
+/// One light per pixel, along the recorded directions, which are those of [`DistantLights::reference`].
+fn lights(case: &Case) -> DistantLights {
+    compare(case, "in.light_directions", DistantLights::reference(grid(case, "in.env_log")).directions());
     let directions = triples(case, "in.light_directions");
-    Lights::new(&directions, &vec![1.0; directions.len()]).expect("lights")
+    DistantLights::new(&directions, &vec![1.0; directions.len()]).expect("lights")
 }
 
 fn renderings(case: &Case) {

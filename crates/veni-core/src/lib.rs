@@ -29,6 +29,6 @@ pub use veni_fit::shade;
 pub use veni_image as panorama;
 pub use veni_light::{
     Error, Result, cholesky, digest, error, field, latent, light, model, output, progress, random, skies,
-    sphere, text,
+    sphere, text, vector,
 };
 pub use veni_synth as synth;

@@ -18,7 +18,7 @@ use veni_light::output::{Overwrite, below, write_atomic};
 
 /// A folder of kept results.
 #[derive(Clone, Debug)]
-pub struct Store {
+pub struct ResultStore {
     folder: PathBuf,
 }
 
@@ -39,7 +39,7 @@ struct Kept<T> {
     value: T,
 }
 
-impl Store {
+impl ResultStore {
     /// Results in `folder`, which is created with the first of them.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into() }
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn results_come_back_to_the_bit_under_their_own_key_only() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::new(folder.path());
+        let store = ResultStore::new(folder.path());
         assert_eq!(store.get::<Vec<f32>>(&key(1)).unwrap(), None);
         let value = vec![0.1f32, -1e-38, 3.402_823e38];
         store.put(&key(1), &value).unwrap();
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn a_damaged_file_is_named() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::new(folder.path());
+        let store = ResultStore::new(folder.path());
         store.put(&key(1), &1.5f32).unwrap();
         let path = store.path(&key(1)).unwrap();
         let whole = fs::read(&path).unwrap();

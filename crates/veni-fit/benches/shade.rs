@@ -5,8 +5,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use veni_fit::shade::{
-    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm,
-    Surface, Transfer,
+    Camera, Colour, DistantLights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss,
+    ShadingForm, Surface, Transfer,
 };
 use veni_light::sphere::Equirect;
 
@@ -28,7 +28,7 @@ fn shade(c: &mut Criterion) {
         let light: Vec<_> = grid.directions().iter().map(|d| d.map(|v| 0.5 * v)).collect();
         for (name, material) in &materials {
             for (kept, memory) in [("stored", veni_fit::shade::DEFAULT_MEMORY), ("on the fly", 0)] {
-                let lights = Lights::equirect(grid);
+                let lights = DistantLights::equirect(grid);
                 let transfer =
                     Transfer::with_memory(&surface, material, lights, ShadingForm::Physical, memory).unwrap();
                 let target = transfer.render(&vec![[1.0; 3]; grid.len()]);

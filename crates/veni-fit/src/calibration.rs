@@ -2,6 +2,7 @@
 
 use veni_light::light::{Lights, luminance};
 use veni_light::sphere::{Equirect, ways};
+use veni_light::vector::dot;
 
 /// No code is so far off; beyond, something else is wrong than the exposure.
 const MOST: f64 = 2.0;
@@ -24,7 +25,7 @@ pub fn lit_exposure(grid: Equirect, rest: &[f32], decoded: &[f32], lights: &Ligh
     let (rest, field) = (irradiance(grid, rest), irradiance(grid, decoded));
     let of_lights = |way: [f32; 3]| -> f64 {
         let each = lights.iter().map(|light| {
-            let cosine: f32 = light.direction.iter().zip(way).map(|(d, n)| d * n).sum();
+            let cosine = dot(light.direction, way);
             f64::from(cosine.max(0.0) * luminance(light.irradiance))
         });
         each.sum()
@@ -61,7 +62,7 @@ fn irradiance(grid: Equirect, log_radiance: &[f32]) -> Vec<f64> {
         .collect();
     let facing = |way: [f32; 3]| -> f64 {
         let each = directions.iter().zip(&lit).map(|(d, lit)| {
-            let cosine: f32 = d.iter().zip(way).map(|(d, n)| d * n).sum();
+            let cosine = dot(*d, way);
             lit * f64::from(cosine.max(0.0))
         });
         each.sum()

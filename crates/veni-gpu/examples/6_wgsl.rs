@@ -14,7 +14,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use veni_gpu::shader::{self, Directions, ENTRY_POINT, Kernel, Sizes, Store, Variant, Weights};
+use veni_gpu::shader::{self, Directions, ENTRY_POINT, Kernel, Sizes, Store, Variant, WeightPrecision};
 use veni_light::model::Model;
 
 /// Workgroup memory that every WebGPU device has, bytes.
@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             eprintln!(
                 "fn veni_radiance, veni_lights (direction: vec3f) -> vec3f; declare in a group and at bindings of your choice:"
             );
-            eprint!("{}", shader::field_bindings(0, 0, Weights::Single));
+            eprint!("{}", shader::field_bindings(0, 0, WeightPrecision::Single));
             shader::field(sizes)
         }
     };
@@ -66,7 +66,7 @@ fn kernel(sizes: Sizes) -> Result<String, String> {
     let variant = Variant {
         sizes,
         kernel: Kernel::Tiled { memory: WORKGROUP_MEMORY, subgroups: false },
-        weights: Weights::Single,
+        weights: WeightPrecision::Single,
         directions: Directions::Grid,
         store: Store::Buffer,
     };

@@ -17,9 +17,9 @@ use crate::shader::Grid;
 /// Bytes of a band of rows: small enough for every device's bindings and for memory, large enough to keep it busy.
 const BAND_BYTES: u64 = 32 << 20;
 
-/// What a bake of rows looks like: a panorama or stacked cube faces, in a frame.
+/// What rows are baked of: a panorama or stacked cube faces, in a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Picture {
+pub struct BakeLayout {
     /// The whole grid.
     pub grid: Grid,
     /// Axes that cube faces are named by.
@@ -28,7 +28,7 @@ pub struct Picture {
 
 /// Bakes the first latent and hands the rows over one by one, from the top, as
 /// [`Field::bake_rows`](veni_light::field::Field::bake_rows) does. While one band is read, the next is computed; however
-/// large the picture, two bands are held.
+/// large the whole, two bands are held.
 ///
 /// # Errors
 /// What [`GpuDecoder::bake`] says; [`Error::Gpu`] if the device is lost; the first error of `each_row`, which ends the work.
@@ -36,15 +36,15 @@ pub fn bake_rows<E: From<Error>>(
     decoder: &GpuDecoder,
     queue: &Queue,
     latents: &GpuLatents,
-    picture: Picture,
+    layout: BakeLayout,
     mut each_row: impl FnMut(usize, &[[f32; 3]]) -> Result<(), E>,
 ) -> Result<(), E> {
-    if let Grid::List { .. } = picture.grid {
+    if let Grid::List { .. } = layout.grid {
         return Err(Error::invalid("a list of directions has no rows").into());
     }
     let latents = &latents.first();
-    let width = picture.grid.width();
-    let height = count(picture.grid)? / width;
+    let width = layout.grid.width();
+    let height = count(layout.grid)? / width;
     let row_bytes = 16 * u64::from(width);
     let band = (BAND_BYTES / row_bytes).clamp(1, u64::from(height)) as u32;
     let device = decoder.device();
@@ -59,7 +59,7 @@ pub fn bake_rows<E: From<Error>>(
     let host = [one?, two?];
     let start = |rows: Range<u32>, into: &Buffer| -> Result<Pending> {
         let mut encoder = encoder(device)?;
-        let bake = Bake::rows(&radiance, picture.grid, rows.clone()).frame(picture.frame);
+        let bake = Bake::rows(&radiance, layout.grid, rows.clone()).frame(layout.frame);
         decoder.bake(&mut encoder, latents, &bake)?;
         let bytes = 16 * u64::from(width) * u64::from(rows.end - rows.start);
         encoder.copy_buffer_to_buffer(&radiance, 0, into, 0, bytes);

@@ -1,6 +1,7 @@
 //! Primaries: luminance, and the matrix from any RGB space to Rec. 709 with D65 white.
 
 pub use veni_light::light::{LUMINANCE, luminance};
+use veni_light::vector::dot;
 
 /// Rows of a linear map of colours.
 pub(super) type Matrix = [[f64; 3]; 3];
@@ -120,12 +121,12 @@ fn bradford(from: [f64; 3], to: [f64; 3]) -> Option<Matrix> {
 }
 
 fn apply(m: Matrix, v: [f64; 3]) -> [f64; 3] {
-    m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+    m.map(|row| dot(row, v))
 }
 
 fn multiply(a: Matrix, b: Matrix) -> Matrix {
     let columns = transpose(b);
-    a.map(|row| columns.map(|column| row[0] * column[0] + row[1] * column[1] + row[2] * column[2]))
+    a.map(|row| columns.map(|column| dot(row, column)))
 }
 
 fn transpose(m: Matrix) -> Matrix {

@@ -57,7 +57,7 @@ pub use panorama::{DARK_SHARE, LOG_FLOOR, Panorama, without_zeros};
 pub use picture::{Picture, read_mask, read_mask_with};
 pub use provenance::{PIXEL_DIGEST, Provenance};
 pub use read::{
-    Content, DEFAULT_MAX_PIXELS, LdrPanorama, METADATA, Metadata, ReadOptions, Transfer, Treatment,
+    Content, DEFAULT_MAX_PIXELS, LdrPanorama, METADATA, Metadata, ReadOptions, TransferFunction, Treatment,
     attributes, peak_bytes,
 };
 pub use sanitise::{Sanitised, log_reference};

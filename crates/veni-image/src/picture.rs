@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{Content, Error, ReadOptions, Result, Transfer, luminance};
+use crate::{Content, Error, ReadOptions, Result, TransferFunction, luminance};
 
 /// A display value from here on is taken for clipped.
 const CLIPPED: f32 = 254.0 / 255.0;
@@ -76,7 +76,7 @@ impl Picture {
             Content::Radiance(panorama) => (panorama, None),
             Content::Display(image) => {
                 let clip = image.linear_value(CLIPPED);
-                (image.linear(Transfer::Srgb), Some(clip))
+                (image.linear(TransferFunction::Srgb), Some(clip))
             }
         };
         let size = [panorama.grid.width, panorama.grid.height];

@@ -8,6 +8,7 @@
 //! | [`model`] | the weight file, and the models inside this crate |
 //! | [`field`] | the decoder folded for one latent: radiance in any direction |
 //! | [`light`] | what renderers need of an environment map |
+//! | [`vector`] | sums and products of three numbers |
 //! | [`skies`] | random skies on request: where the sun is, how overcast, how warm |
 //! | [`random`] | streams of random numbers that are the same on every machine |
 //! | [`cholesky`] | small dense systems of equations |
@@ -67,5 +68,6 @@ pub mod skies;
 pub mod sphere;
 mod tasks;
 pub mod text;
+pub mod vector;
 
 pub use error::{Error, Result};

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::noise::{cell, fractal2};
-use super::surface::{Ground, Pattern, Surface};
+use super::surface::{Ground, GroundMaterial, Pattern};
 
 /// The ground at a point.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +52,7 @@ impl Ground {
             Pattern::None => 0.0,
             Pattern::Patches => soft(fractal2(p / 9.0, 4, 0.6, footprint / 9.0, seed) - 0.1, 0.25),
             Pattern::Strip => {
-                let share = if self.surface == Surface::Paving { 1.0 } else { 0.7 };
+                let share = if self.surface == GroundMaterial::Paving { 1.0 } else { 0.7 };
                 let bend = 0.35 * fractal2(p / 14.0, 3, 0.5, footprint / 14.0, seed) * self.width.min(3.0);
                 let across = axis.perp_dot(p) - self.offset;
                 share * soft(self.width - across.abs() + bend, 0.3)
@@ -73,17 +73,17 @@ impl Ground {
         }
     }
 
-    fn patch(&self, surface: Surface, p: Vec2, footprint: f32, which: u32) -> Patch {
+    fn patch(&self, surface: GroundMaterial, p: Vec2, footprint: f32, which: u32) -> Patch {
         let (size, contrast) = surface.texture();
         let contrast = contrast * self.contrast;
         let seed = self.seed ^ (which.wrapping_mul(0x9e37));
-        if surface == Surface::Water {
+        if surface == GroundMaterial::Water {
             return Patch { albedo: surface.albedo(), normal: self.waves(p, footprint), water: 1.0 };
         }
         let v = fractal2(p / size, 6, 0.85, footprint / size, seed);
         let broad = fractal2(p / (9.0 * size), 3, 0.6, footprint / (9.0 * size), seed ^ 0xb4);
         let vast = fractal2(p / (50.0 * size), 3, 0.6, footprint / (50.0 * size), seed ^ 0xb5);
-        let tiles = if surface == Surface::Paving { 0.5 * self.tiles(p, footprint) } else { 0.0 };
+        let tiles = if surface == GroundMaterial::Paving { 0.5 * self.tiles(p, footprint) } else { 0.0 };
         let slope = |k: u32| contrast * 0.6 * fractal2(p / size, 4, 0.7, footprint / size, seed ^ k);
         let tint = Vec3::new(1.0 + 0.25 * contrast * broad, 1.0, 1.0 - 0.25 * contrast * broad);
         Patch {
@@ -161,8 +161,8 @@ mod tests {
     fn patterns_vanish_at_a_distance_and_rough_ground_is_darker_against_the_light() {
         // a fixed ground, not a drawn one: how far its tones spread differs from seed to seed
         let rows = Ground {
-            surface: Surface::Paving,
-            second: Surface::Grass,
+            surface: GroundMaterial::Paving,
+            second: GroundMaterial::Grass,
             pattern: Pattern::Rows,
             width: 0.8,
             roughness: 0.5,

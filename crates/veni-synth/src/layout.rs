@@ -53,7 +53,7 @@ pub(super) fn layout(scene: &Scene) -> Layout {
     let mut builder = Builder {
         draw: Draw::new(scene.seed, scene.index, Part::Layout),
         lit: scene.lit,
-        snow: scene.ground.surface == super::surface::Surface::Snow,
+        snow: scene.ground.surface == super::surface::GroundMaterial::Snow,
         bearing: Vec2::from_angle(scene.ground.bearing.to_radians()),
         layout: Layout::default(),
     };

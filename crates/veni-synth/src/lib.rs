@@ -11,7 +11,7 @@
 //! | clouds | [`CloudLayer`]s of fractal density, ray-marched (cumulus) or thin (stratus), lit by sun, sky and ground |
 //! | hills, mountains, woods, towns | [`Ridge`]s, behind air |
 //! | trees, houses, rocks, walls, cars, lamps | solids around the viewer with shadows, by [`Setting`] |
-//! | ground | [`Surface`]s in a [`Pattern`]; water with waves, Fresnel reflection and glitter |
+//! | ground | [`GroundMaterial`]s in a [`Pattern`]; water with waves, Fresnel reflection and glitter |
 //! | night | moonlight, stars, airglow, street lamps, windows, the glow of towns |
 //!
 //! ```
@@ -61,4 +61,4 @@ pub use draw::Overrides;
 pub use generate::generate;
 pub use render::render;
 pub use scene::{Moon, Ridge, RidgeKind, Scene, Setting, SkyKind};
-pub use surface::{Ground, Pattern, Surface};
+pub use surface::{Ground, GroundMaterial, Pattern};

@@ -5,7 +5,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::cloud_layer::CloudLayer;
-use super::surface::{Ground, Surface};
+use super::surface::{Ground, GroundMaterial};
 
 /// All parameters of a scene; [`super::render`] is a function of these alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -176,7 +176,7 @@ pub struct Ridge {
     /// How much the height varies, as a share of it.
     pub relief: f32,
     /// What it is covered with.
-    pub surface: Surface,
+    pub surface: GroundMaterial,
     /// How much of the horizon a wood or a town leaves open, from 0 nothing to 1 all; not the share: 0.3 leaves a tenth,
     /// 0.7 four fifths.
     pub gaps: f32,

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Ground {
     /// What most of it is.
-    pub surface: Surface,
+    pub surface: GroundMaterial,
     /// What the rest is.
-    pub second: Surface,
+    pub second: GroundMaterial,
     /// Where the second surface is.
     pub pattern: Pattern,
     /// Bearing of strips or of the normal of a shore, degrees.
@@ -55,7 +55,7 @@ pub enum Pattern {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[expect(missing_docs, reason = "the names say it")]
-pub enum Surface {
+pub enum GroundMaterial {
     Grass,
     DryGrass,
     Soil,
@@ -68,7 +68,7 @@ pub enum Surface {
     Water,
 }
 
-impl Surface {
+impl GroundMaterial {
     /// Albedo under daylight: typical values of field measurements (ECOSTRESS and USGS spectral libraries).
     pub(super) fn albedo(self) -> Vec3 {
         match self {

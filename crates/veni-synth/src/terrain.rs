@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::noise::{cell, fractal2, noise2};
 use super::scene::{Ridge, RidgeKind};
-use super::surface::Surface;
+use super::surface::GroundMaterial;
 
 /// Ridges from near to far.
 #[derive(Clone, Debug)]
@@ -110,11 +110,11 @@ fn slope(ridge: &Ridge, flat: Vec2, z: f32, height: f32, footprint: f32) -> Slop
             let wood = rough(0.5 * ridge.height, 3);
             let mut albedo = ridge.surface.albedo() * (0.4 * wood).exp();
             if jagged && normal.z < 0.85 * normal.length() {
-                albedo = albedo.lerp(Surface::Rock.albedo(), 0.7);
+                albedo = albedo.lerp(GroundMaterial::Rock.albedo(), 0.7);
             }
             let snow = z - ridge.snow_line + 0.25 * ridge.height * rough(0.3 * ridge.height, 4);
             if snow > 0.0 {
-                albedo = albedo.lerp(Surface::Snow.albedo(), (snow / (0.1 * ridge.height)).min(1.0));
+                albedo = albedo.lerp(GroundMaterial::Snow.albedo(), (snow / (0.1 * ridge.height)).min(1.0));
             }
             Slope {
                 distance: ridge.distance * (1.0 + 0.3 * z / height.max(1.0)),
@@ -163,7 +163,7 @@ mod tests {
     const KINDS: [RidgeKind; 4] = [RidgeKind::Hills, RidgeKind::Mountains, RidgeKind::Trees, RidgeKind::Town];
 
     fn ridge(kind: RidgeKind, distance: f32, gaps: f32, seed: u32) -> Ridge {
-        let (height, relief, surface, snow_line) = (40.0, 0.5, Surface::Grass, f32::INFINITY);
+        let (height, relief, surface, snow_line) = (40.0, 0.5, GroundMaterial::Grass, f32::INFINITY);
         Ridge { kind, distance, height, relief, surface, gaps, snow_line, seed }
     }
 

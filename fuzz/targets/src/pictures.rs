@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use image::{ImageFormat, Rgb, RgbImage, Rgba, RgbaImage};
-use veni_image::{Content, Transfer};
+use veni_image::{Content, TransferFunction};
 
 use super::images::options;
 use super::{Target, untouched};
@@ -26,7 +26,7 @@ const XMP: &[u8] =
 fn picture(path: &Path) -> bool {
     match Content::read(path, &options()) {
         Ok(Content::Display(found)) => {
-            let linear = found.linear(Transfer::Srgb);
+            let linear = found.linear(TransferFunction::Srgb);
             // colours of wider primaries are outside of 0 to 1
             assert!(linear.pixels().as_flattened().iter().all(|v| v.is_finite()), "display values");
             true

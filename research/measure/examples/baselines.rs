@@ -15,14 +15,14 @@ use veni_core::panorama::metrics::Alignment;
 use veni_core::progress::Silent;
 use veni_core::sphere::Equirect;
 use veni_core::{Error, Result};
-use veni_eval::baseline::{Baseline, Kind, Space};
+use veni_eval::baseline::{Baseline, BaselineKind, TargetSpace};
 
-const SYSTEMS: [(&str, Kind, Space); 5] = [
-    ("spherical harmonics, log", Kind::SphericalHarmonics, Space::Log),
-    ("spherical harmonics, linear", Kind::SphericalHarmonics, Space::Linear),
-    ("spherical Gaussians, log", Kind::SphericalGaussians, Space::Log),
-    ("spherical Gaussians, linear", Kind::SphericalGaussians, Space::Linear),
-    ("Gaussian mixture", Kind::GaussianMixture, Space::Linear),
+const SYSTEMS: [(&str, BaselineKind, TargetSpace); 5] = [
+    ("spherical harmonics, log", BaselineKind::SphericalHarmonics, TargetSpace::Log),
+    ("spherical harmonics, linear", BaselineKind::SphericalHarmonics, TargetSpace::Linear),
+    ("spherical Gaussians, log", BaselineKind::SphericalGaussians, TargetSpace::Log),
+    ("spherical Gaussians, linear", BaselineKind::SphericalGaussians, TargetSpace::Linear),
+    ("Gaussian mixture", BaselineKind::GaussianMixture, TargetSpace::Linear),
 ];
 
 fn main() -> Result<()> {

@@ -20,7 +20,7 @@ use onnx_file::OnnxFile;
 use veni_core::expand::Expand;
 use veni_core::expand::ExpandOptions;
 use veni_core::expand::network::{NetworkOptions, OnnxNetwork};
-use veni_core::panorama::{LdrPanorama, Transfer};
+use veni_core::panorama::{LdrPanorama, TransferFunction};
 use veni_core::sphere::Equirect;
 
 type Failure = Box<dyn std::error::Error>;
@@ -47,7 +47,7 @@ fn main() -> Result<(), Failure> {
         println!("network: {seconds:.2} s, peak {} MB, {:.1} % clipped", peak(), 100.0 * done.clipped);
     }
     let start = Instant::now();
-    let done = ldr.expand(&ExpandOptions { transfer: Transfer::Srgb, ..Default::default() });
+    let done = ldr.expand(&ExpandOptions { transfer: TransferFunction::Srgb, ..Default::default() });
     println!("fitted functions: {:.2} s, {} regions", start.elapsed().as_secs_f64(), done.regions);
     Ok(())
 }

@@ -16,7 +16,7 @@ use veni_eval::protocol::{
     equivariance, interpolation, inverse_rendering, light, paper, photo, realism, reconstruction, spheres,
     uniqueness,
 };
-use veni_eval::store::Store;
+use veni_eval::store::ResultStore;
 use veni_eval::table::{Format, Table};
 use veni_light::Error;
 use veni_light::output::{Overwrite, write_atomic};
@@ -244,7 +244,7 @@ impl Evaluate {
         };
         let (data, train) = (load(&files)?, if known.is_empty() { None } else { Some(load(&known)?) });
         inputs::create_folder(&self.out)?;
-        let (store, figures) = (Store::new(&self.out), self.out.join("figures"));
+        let (store, figures) = (ResultStore::new(&self.out), self.out.join("figures"));
         let settings =
             Settings { seed: self.seed, quick: self.quick, pairs: self.pairs, frames: self.frames };
         let bases = inputs::bases(&self.baselines, &subjects, self.quick)?;

@@ -11,7 +11,7 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use clap::{ArgGroup, Args};
 use serde_json::json;
-use veni_fit::shade::{Camera, Colour, Lights, Material, ShadingForm, Surface, Transfer};
+use veni_fit::shade::{Camera, Colour, DistantLights, Material, ShadingForm, Surface, Transfer};
 use veni_image::tonemap::{Curve, REFERENCE_QUANTILE, Tonemap, quantile};
 use veni_image::{Panorama, Precision, WriteFormat, WriteOptions};
 use veni_light::output::Overwrite;
@@ -207,7 +207,13 @@ impl RenderProbe {
         } else {
             Material::lambert(albedo)
         };
-        Ok(Transfer::with_memory(surface, &material, Lights::equirect(grid), ShadingForm::Physical, 0)?)
+        Ok(Transfer::with_memory(
+            surface,
+            &material,
+            DistantLights::equirect(grid),
+            ShadingForm::Physical,
+            0,
+        )?)
     }
 
     fn material_json(&self) -> serde_json::Value {

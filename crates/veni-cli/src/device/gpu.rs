@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, anyhow, bail};
 use veni_gpu::adapters::{self, Found, Opened};
-use veni_gpu::read_back::{self, Picture};
+use veni_gpu::read_back::{self, BakeLayout};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::AdapterInfo;
 use veni_gpu::{GpuDecoder, GpuLatents};
@@ -130,9 +130,9 @@ impl Conditioned {
     /// Hands over the rows of an image from the top. While one band is read, the next is computed.
     pub(super) fn rows(&self, directions: Directions, each: Push<'_>) -> veni_light::Result<()> {
         let Inner { name, opened, decoder } = &*self.gpu;
-        let picture = picture(directions);
+        let layout = layout(directions);
         let mut lit = Lit::new(&self.lights, directions);
-        let rows = read_back::bake_rows(decoder, &opened.queue, &self.latents, picture, |at, row| {
+        let rows = read_back::bake_rows(decoder, &opened.queue, &self.latents, layout, |at, row| {
             each(lit.row(at, row)).map_err(veni_gpu::Error::Light)
         });
         rows.map_err(|error| match error {
@@ -179,13 +179,13 @@ impl<'a> Lit<'a> {
 }
 
 /// Sides fit in 32 bits: `--size` allows far less.
-fn picture(directions: Directions) -> Picture {
+fn layout(directions: Directions) -> BakeLayout {
     match directions {
-        Directions::Equirect(grid) => Picture {
+        Directions::Equirect(grid) => BakeLayout {
             grid: Grid::Equirect { width: grid.width as u32, height: grid.height as u32 },
             frame: Frame::default(),
         },
-        Directions::Cube { edge, frame } => Picture { grid: Grid::Cube { size: edge as u32 }, frame },
+        Directions::Cube { edge, frame } => BakeLayout { grid: Grid::Cube { size: edge as u32 }, frame },
     }
 }
 

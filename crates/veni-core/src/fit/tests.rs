@@ -6,8 +6,8 @@ use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
 use super::shade::{
-    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm,
-    Surface, Transfer,
+    Camera, Colour, DistantLights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss,
+    ShadingForm, Surface, Transfer,
 };
 use super::*;
 use crate::train::loss::LossConfig;
@@ -115,7 +115,7 @@ fn ball(seed: u64, exposure: f32) -> RenderedImage {
     let camera = Camera::framing(place, [0.0; 2], REFERENCE_FIELD_OF_VIEW, [20, 20], 0.05).unwrap();
     let surface = Surface::sphere(&camera, place, 20, 20).unwrap();
     let material = Material::blinn_phong(Colour::Uniform([0.8; 3]), 0.5, 40.0);
-    let lights = Lights::equirect(Equirect::new(16, 8));
+    let lights = DistantLights::equirect(Equirect::new(16, 8));
     let transfer = Transfer::new(&surface, &material, lights, ShadingForm::Physical).unwrap();
     let light = Latent { log_exposure: exposure, ..latent(seed) };
     let field = model(&decoder()).decoder().unwrap().condition(&light).unwrap();

@@ -85,7 +85,7 @@ impl WholeLoss {
                     return shape;
                 }
                 let rows = Tensor::ones([1, p.dims()[1], 1, 1], &p.device());
-                shape + mse::mse(LossForm::Reference, mse::Space::Log, p, i, rows, None)
+                shape + mse::mse(LossForm::Reference, mse::LossSpace::Log, p, i, rows, None)
             }
             // the schedules are those of training; a fit takes their first values
             Kind::Terms(loss) => loss.terms(0, p, i, None).total(),

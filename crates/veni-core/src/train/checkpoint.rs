@@ -28,13 +28,13 @@ pub struct CheckpointInfo {
     /// Updates made.
     pub step: u64,
     /// The best validation so far.
-    pub best: Option<Best>,
+    pub best: Option<BestValidation>,
 }
 
 /// The validation by which `model.safetensors` was chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Best {
+pub struct BestValidation {
     /// After how many updates.
     pub step: u64,
     /// Mean LDR PSNR over the validation panoramas, dB.
@@ -43,7 +43,7 @@ pub struct Best {
 
 impl CheckpointInfo {
     /// The description of a state after `step` updates.
-    pub fn new(step: u64, best: Option<Best>) -> Self {
+    pub fn new(step: u64, best: Option<BestValidation>) -> Self {
         Self { format: FORMAT, step, best }
     }
 }
@@ -122,7 +122,7 @@ mod tests {
         let path = folder.path().join("state.safetensors");
         let values = Array { shape: vec![2, 1], data: vec![0.1, -3e-30] };
         let state = Weights::from([("first.a".to_owned(), values)]);
-        let info = CheckpointInfo::new(7, Some(Best { step: 5, ldr_psnr: 16.90000001 }));
+        let info = CheckpointInfo::new(7, Some(BestValidation { step: 5, ldr_psnr: 16.90000001 }));
         save(&path, &state, &info).unwrap();
         save(&path, &state, &info).unwrap();
         assert_eq!(load(&path).unwrap(), (state.clone(), info.clone()));

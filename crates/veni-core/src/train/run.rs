@@ -22,7 +22,7 @@ use std::time::Instant;
 use burn::module::Module;
 use serde::Serialize;
 
-use crate::train::checkpoint::{self, Best, CheckpointInfo};
+use crate::train::checkpoint::{self, BestValidation, CheckpointInfo};
 use crate::train::config::{Stage, TrainConfig};
 use crate::train::init::Initialised;
 use crate::train::log::MetricsLog;
@@ -67,7 +67,7 @@ pub struct Trainer {
     command: String,
     replicas: Replicas,
     optimiser: Optimiser,
-    best: Option<Best>,
+    best: Option<BestValidation>,
     initialised: Option<Initialised>,
 }
 

@@ -4,7 +4,7 @@ use super::describe::{Region, describe};
 use super::nearest::{Angles, NOWHERE, nearest_outside};
 use super::regions::{OUTSIDE, label};
 use super::{CLIPPED, channels};
-use veni_image::{LdrPanorama, Panorama, Transfer};
+use veni_image::{LdrPanorama, Panorama, TransferFunction};
 
 /// An LDR panorama, linearised, and its clipped regions.
 #[derive(Clone, Debug)]
@@ -19,7 +19,7 @@ pub struct Analysis {
 
 impl Analysis {
     /// Finds the clipped regions and rebuilds partly clipped channels.
-    pub fn new(ldr: &LdrPanorama, transfer: Transfer) -> Self {
+    pub fn new(ldr: &LdrPanorama, transfer: TransferFunction) -> Self {
         let grid = ldr.grid();
         // each channel was clipped for itself, in the primaries of the file
         let mut linear = ldr.linear_as_stored(transfer);

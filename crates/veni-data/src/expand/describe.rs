@@ -7,6 +7,7 @@ use super::nearest::{Angles, NOWHERE, nearest_outside};
 use super::regions::OUTSIDE;
 use super::scene::Scene;
 use veni_image::Panorama;
+use veni_light::vector::length;
 
 /// Number of [`Region::features`].
 pub const FEATURES: usize = 8;
@@ -109,7 +110,7 @@ impl Sums {
     fn region(&self, half: f64, scene: Scene) -> Region {
         let radius = self.deepest + half;
         let disc = 2.0 * PI * (1.0 - radius.cos());
-        let length = self.centre.iter().map(|c| c * c).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+        let length = length(self.centre).max(f64::MIN_POSITIVE);
         let centre = self.centre.map(|c| (c / length) as f32);
         let hue = self.ring_hue / self.ring.max(f64::MIN_POSITIVE);
         let features = [

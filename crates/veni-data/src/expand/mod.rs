@@ -29,7 +29,7 @@ mod scene;
 #[cfg(test)]
 mod tests;
 
-use veni_image::{LdrPanorama, Panorama, Transfer};
+use veni_image::{LdrPanorama, Panorama, TransferFunction};
 
 use crate::Result;
 
@@ -47,7 +47,7 @@ pub const CLIPPED: f32 = 250.0 / 255.0;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ExpandOptions {
     /// From display values to linear ones.
-    pub transfer: Transfer,
+    pub transfer: TransferFunction,
     /// What the linear functions are.
     pub parameters: Parameters,
 }
@@ -88,7 +88,7 @@ pub trait Expand {
     /// name, or gives values that are not a radiance.
     fn expand_by(
         &self,
-        network: &dyn network::Network,
+        network: &dyn network::ExpansionNetwork,
         options: &network::NetworkOptions,
     ) -> Result<network::NetworkExpanded>;
 }
@@ -102,7 +102,7 @@ impl Expand for LdrPanorama {
 
     fn expand_by(
         &self,
-        network: &dyn network::Network,
+        network: &dyn network::ExpansionNetwork,
         options: &network::NetworkOptions,
     ) -> Result<network::NetworkExpanded> {
         network::expand_by(self, network, options)

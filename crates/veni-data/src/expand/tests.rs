@@ -48,12 +48,12 @@ fn nothing_clipped_is_nothing_changed() {
     let truth = Panorama::from_fn(GRID, |[x, y, z]| [0.4 + 0.3 * x, 0.4 + 0.3 * y, 0.4 + 0.3 * z]);
     let ldr = record(&truth);
     let expanded = ldr.expand(&ExpandOptions::default());
-    assert_eq!(expanded.panorama, ldr.linear(Transfer::Srgb));
+    assert_eq!(expanded.panorama, ldr.linear(TransferFunction::Srgb));
     assert_eq!((expanded.clipped, expanded.regions, expanded.sun), (0.0, 0, None));
     for (a, b) in truth.pixels().iter().flatten().zip(expanded.panorama.pixels().iter().flatten()) {
         assert!((a - b).abs() < 5e-3, "{a} became {b}: 8 bits of sRGB");
     }
-    let gamma = ldr.linear(Transfer::Gamma(2.0)).pixels()[0][0];
+    let gamma = ldr.linear(TransferFunction::Gamma(2.0)).pixels()[0][0];
     assert!((gamma - ldr.values()[0][0].powi(2)).abs() < 1e-6);
 }
 
@@ -66,14 +66,15 @@ fn the_sun_comes_back_where_it_was() {
         let sun = expanded.sun.expect("a sun");
         let cosine: f32 = sun.direction.iter().zip(at).map(|(a, b)| a * b).sum();
         assert!(cosine > 0.9995, "{:?} for {at:?}", sun.direction);
-        let [all, linear, rebuilt] = [&truth, &ldr.linear(Transfer::Srgb), &expanded.panorama].map(energy);
+        let [all, linear, rebuilt] =
+            [&truth, &ldr.linear(TransferFunction::Srgb), &expanded.panorama].map(energy);
         assert!(
             (rebuilt / all).ln().abs() < 0.9 * (linear / all).ln().abs(),
             "{linear} → {rebuilt} of {all}"
         );
         assert!(expanded.panorama.pixels().iter().flatten().all(|v| v.is_finite()));
         let below = ldr
-            .linear(Transfer::Srgb)
+            .linear(TransferFunction::Srgb)
             .pixels()
             .iter()
             .flatten()
@@ -108,7 +109,7 @@ fn a_clipped_channel_takes_the_hue_around_it() {
         [0.8 * level, 1.2 * level, 2.0 * level]
     });
     let ldr = record(&truth);
-    let (linear, expanded) = (ldr.linear(Transfer::Srgb), ldr.expand(&ExpandOptions::default()));
+    let (linear, expanded) = (ldr.linear(TransferFunction::Srgb), ldr.expand(&ExpandOptions::default()));
     assert!(expanded.clipped > 0.005 && expanded.regions == 0, "{} {}", expanded.clipped, expanded.regions);
     let worst = |image: &Panorama| {
         let error = |(a, b): (&[f32; 3], &[f32; 3])| (a[2] / b[2] - 1.0).abs();
@@ -140,7 +141,7 @@ fn expanded_is_nearer_to_the_truth_than_linearised() {
         truth.scale(2.0 * MIDDLE_GREY / truth.mean_log_luminance().exp());
         let ldr = record(&truth);
         for (image, sums) in [
-            (ldr.linear(Transfer::Srgb), &mut linear),
+            (ldr.linear(TransferFunction::Srgb), &mut linear),
             (ldr.expand(&ExpandOptions::default()).panorama, &mut expanded),
         ] {
             let clipped = truth

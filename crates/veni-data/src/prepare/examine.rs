@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::Fingerprint;
-use crate::expand::network::{Estimate, Network, NetworkOptions};
+use crate::expand::network::{Estimate, ExpansionNetwork, NetworkOptions};
 use crate::expand::{Expand, ExpandOptions, Sun};
 use crate::whole::{refuse_holes, whole};
 use crate::{Error, Result};
@@ -37,7 +37,7 @@ pub enum Expander {
     /// The fitted functions of [`panorama::expand`](crate::expand).
     Fitted(ExpandOptions),
     /// A network.
-    Network(Arc<dyn Network>, NetworkOptions),
+    Network(Arc<dyn ExpansionNetwork>, NetworkOptions),
 }
 
 /// How an LDR panorama was expanded.

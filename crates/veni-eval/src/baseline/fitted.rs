@@ -1,8 +1,8 @@
 //! What a fit gives.
 
-use super::gaussians::{Gaussians, Lobe};
+use super::gaussians::{Gaussians, SphericalGaussian};
 use super::harmonics::Harmonics;
-use super::{Baseline, Space};
+use super::{Baseline, TargetSpace};
 use crate::{Error, Result};
 
 /// Where an expansion of radiance itself falls below this share of its own mean over the sphere, it is held there: such
@@ -11,7 +11,7 @@ pub const FLOOR: f64 = 1e-3;
 
 /// The expansion itself.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Field {
+pub enum BaselineField {
     /// Spherical harmonics.
     Harmonics(Harmonics),
     /// Spherical Gaussians.
@@ -22,9 +22,9 @@ pub enum Field {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fitted {
     /// What the field is an expansion of.
-    pub space: Space,
+    pub space: TargetSpace,
     /// The field.
-    pub field: Field,
+    pub field: BaselineField,
 }
 
 impl Fitted {
@@ -33,13 +33,13 @@ impl Fitted {
     pub fn log_radiance(&self, directions: &[[f32; 3]]) -> Vec<[f32; 3]> {
         let directions: Vec<_> = directions.iter().map(|d| d.map(f64::from)).collect();
         let (values, mean) = match &self.field {
-            Field::Harmonics(field) => (field.values(&directions), field.mean()),
-            Field::Gaussians(field) => (field.values(&directions), field.mean()),
+            BaselineField::Harmonics(field) => (field.values(&directions), field.mean()),
+            BaselineField::Gaussians(field) => (field.values(&directions), field.mean()),
         };
         let floor = mean.map(|m| (FLOOR * m).max(f64::from(f32::MIN_POSITIVE)));
         let log = |v: [f64; 3]| match self.space {
-            Space::Log => v.map(|v| v as f32),
-            Space::Linear => [0, 1, 2].map(|c| v[c].max(floor[c]).ln() as f32),
+            TargetSpace::Log => v.map(|v| v as f32),
+            TargetSpace::Linear => [0, 1, 2].map(|c| v[c].max(floor[c]).ln() as f32),
         };
         values.into_iter().map(log).collect()
     }
@@ -57,20 +57,22 @@ impl Fitted {
         }
         let (triples, _) = parameters.as_chunks::<3>();
         let field = match system {
-            Baseline::SphericalHarmonics { .. } => Field::Harmonics(Harmonics::new(triples.to_vec())?),
+            Baseline::SphericalHarmonics { .. } => {
+                BaselineField::Harmonics(Harmonics::new(triples.to_vec())?)
+            }
             Baseline::SphericalGaussians { .. } | Baseline::GaussianMixture { .. } => {
                 let (constant, lobes) = triples.split_last().expect("a constant at least: checked above");
                 let lobe = |[place, amplitude]: &[[f64; 3]; 2]| {
                     let [theta, phi, log_sharpness] = *place;
                     let ((st, ct), (sp, cp)) = (theta.sin_cos(), phi.sin_cos());
-                    Lobe {
+                    SphericalGaussian {
                         axis: [st * cp, st * sp, ct],
                         sharpness: log_sharpness.exp(),
                         amplitude: *amplitude,
                     }
                 };
                 let lobes = lobes.as_chunks::<2>().0.iter().map(lobe).collect();
-                Field::Gaussians(Gaussians { lobes, constant: *constant })
+                BaselineField::Gaussians(Gaussians { lobes, constant: *constant })
             }
         };
         Ok(Self { space: system.space(), field })
@@ -81,9 +83,9 @@ impl Fitted {
     /// blue; then the constant's.
     pub fn parameters(&self) -> Vec<f64> {
         match &self.field {
-            Field::Harmonics(field) => field.coefficients().as_flattened().to_vec(),
-            Field::Gaussians(field) => {
-                let lobe = |l: &super::gaussians::Lobe| {
+            BaselineField::Harmonics(field) => field.coefficients().as_flattened().to_vec(),
+            BaselineField::Gaussians(field) => {
+                let lobe = |l: &super::gaussians::SphericalGaussian| {
                     let ([x, y, z], [r, g, b]) = (l.axis, l.amplitude);
                     [x.hypot(y).atan2(z), y.atan2(x), l.sharpness.ln(), r, g, b]
                 };

@@ -1,15 +1,15 @@
 //! Which system, of which size.
 
-use super::fitted::{Field, Fitted};
+use super::fitted::{BaselineField, Fitted};
 use super::gaussians::{Gaussians, Search};
 use super::harmonics::Harmonics;
-use super::target::{Space, Target};
+use super::target::{Target, TargetSpace};
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 
 /// A family of systems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum BaselineKind {
     /// [`Baseline::SphericalHarmonics`].
     SphericalHarmonics,
     /// [`Baseline::SphericalGaussians`].
@@ -26,14 +26,14 @@ pub enum Baseline {
         /// L.
         order: usize,
         /// What is expanded.
-        space: Space,
+        space: TargetSpace,
     },
     /// f = b + Σ_g a_g e^{λ_g(⟨μ_g,d⟩−1)}, a of either sign: 6 coefficients per lobe and 3 for b.
     SphericalGaussians {
         /// K.
         lobes: usize,
         /// What is expanded.
-        space: Space,
+        space: TargetSpace,
         /// How the lobes are searched.
         search: Search,
     },
@@ -54,7 +54,7 @@ impl Baseline {
     ///
     /// # Errors
     /// [`Error::Invalid`] if not even a constant fits into `dimension`.
-    pub fn from_dimension(kind: Kind, dimension: usize, space: Space) -> Result<Self> {
+    pub fn from_dimension(kind: BaselineKind, dimension: usize, space: TargetSpace) -> Result<Self> {
         if dimension < 3 {
             return Err(Error::invalid(format!(
                 "a baseline of dimension {dimension}: a constant colour already takes 3"
@@ -62,11 +62,11 @@ impl Baseline {
         }
         let (lobes, search) = ((dimension - 3) / 6, Search::default());
         Ok(match kind {
-            Kind::SphericalHarmonics => {
+            BaselineKind::SphericalHarmonics => {
                 Self::SphericalHarmonics { order: (dimension / 3).isqrt() - 1, space }
             }
-            Kind::SphericalGaussians => Self::SphericalGaussians { lobes, space, search },
-            Kind::GaussianMixture => Self::GaussianMixture { lobes, search },
+            BaselineKind::SphericalGaussians => Self::SphericalGaussians { lobes, space, search },
+            BaselineKind::GaussianMixture => Self::GaussianMixture { lobes, search },
         })
     }
 
@@ -89,10 +89,10 @@ impl Baseline {
     }
 
     /// The quantity that a fit of this system is an expansion of.
-    pub fn space(&self) -> Space {
+    pub fn space(&self) -> TargetSpace {
         match *self {
             Self::SphericalHarmonics { space, .. } | Self::SphericalGaussians { space, .. } => space,
-            Self::GaussianMixture { .. } => Space::Linear,
+            Self::GaussianMixture { .. } => TargetSpace::Linear,
         }
     }
 
@@ -105,13 +105,13 @@ impl Baseline {
         let target = |space| Target::new(grid, log_radiance, space);
         let field = match self {
             Self::SphericalHarmonics { order, space } => {
-                Field::Harmonics(Harmonics::fit(*order, &target(*space)?)?)
+                BaselineField::Harmonics(Harmonics::fit(*order, &target(*space)?)?)
             }
             Self::SphericalGaussians { lobes, space, search } => {
-                Field::Gaussians(Gaussians::fit(*lobes, &target(*space)?, search)?)
+                BaselineField::Gaussians(Gaussians::fit(*lobes, &target(*space)?, search)?)
             }
             Self::GaussianMixture { lobes, search } => {
-                Field::Gaussians(Gaussians::fit_mixture(*lobes, &target(Space::Log)?, search)?)
+                BaselineField::Gaussians(Gaussians::fit_mixture(*lobes, &target(TargetSpace::Log)?, search)?)
             }
         };
         Ok(Fitted { space: self.space(), field })

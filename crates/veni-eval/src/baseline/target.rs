@@ -5,7 +5,7 @@ use veni_light::sphere::Equirect;
 
 /// The quantity that a baseline expands, and in which its squared error is least.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Space {
+pub enum TargetSpace {
     /// ln L: relative errors count. The strong choice for images of many magnitudes.
     #[default]
     Log,
@@ -34,7 +34,7 @@ impl Target {
     ///
     /// # Errors
     /// [`Error::Invalid`] if it does not have 3·W·H values, or one is not the logarithm of an f32.
-    pub(super) fn new(grid: Equirect, log_radiance: &[f32], space: Space) -> Result<Self> {
+    pub(super) fn new(grid: Equirect, log_radiance: &[f32], space: TargetSpace) -> Result<Self> {
         let Equirect { width, height } = grid;
         if log_radiance.len() != 3 * grid.len() {
             return Err(Error::invalid(format!(
@@ -52,8 +52,8 @@ impl Target {
             )));
         }
         let value = |v: f32| match space {
-            Space::Log => f64::from(v),
-            Space::Linear => f64::from(v).exp(),
+            TargetSpace::Log => f64::from(v),
+            TargetSpace::Linear => f64::from(v).exp(),
         };
         let share = |row| grid.solid_angle(row) / (4.0 * std::f64::consts::PI);
         Ok(Self {

@@ -1,5 +1,5 @@
-use super::fitted::{FLOOR, Field};
-use super::gaussians::{Gaussians, Lobe};
+use super::fitted::{BaselineField, FLOOR};
+use super::gaussians::{Gaussians, SphericalGaussian};
 use super::harmonics::Harmonics;
 use super::*;
 use veni_light::sphere::Equirect;
@@ -21,14 +21,14 @@ fn error(fitted: &Fitted, grid: Equirect, image: &[f32]) -> f64 {
 
 #[test]
 fn a_dimension_is_spent_as_said() {
-    let made = |kind, d| Baseline::from_dimension(kind, d, Space::Log).unwrap();
+    let made = |kind, d| Baseline::from_dimension(kind, d, TargetSpace::Log).unwrap();
     for (d, order, lobes, spent) in [(3, 0, 0, 3), (27, 2, 4, 27), (147, 6, 24, 147), (300, 9, 49, 297)] {
-        let harmonics = made(Kind::SphericalHarmonics, d);
+        let harmonics = made(BaselineKind::SphericalHarmonics, d);
         assert_eq!(
             (harmonics, harmonics.dimension()),
-            (Baseline::SphericalHarmonics { order, space: Space::Log }, d)
+            (Baseline::SphericalHarmonics { order, space: TargetSpace::Log }, d)
         );
-        for kind in [Kind::SphericalGaussians, Kind::GaussianMixture] {
+        for kind in [BaselineKind::SphericalGaussians, BaselineKind::GaussianMixture] {
             let (Baseline::SphericalGaussians { lobes: k, .. } | Baseline::GaussianMixture { lobes: k, .. }) =
                 made(kind, d)
             else {
@@ -38,7 +38,10 @@ fn a_dimension_is_spent_as_said() {
         }
     }
     assert!(
-        Baseline::from_dimension(Kind::GaussianMixture, 2, Space::Log).unwrap_err().to_string().contains('2')
+        Baseline::from_dimension(BaselineKind::GaussianMixture, 2, TargetSpace::Log)
+            .unwrap_err()
+            .to_string()
+            .contains('2')
     );
 }
 
@@ -46,9 +49,11 @@ fn a_dimension_is_spent_as_said() {
 fn every_system_improves_with_its_size_and_counts_its_coefficients() {
     let grid = Equirect::new(32, 16);
     let image = sky(grid);
-    for kind in [Kind::SphericalHarmonics, Kind::SphericalGaussians, Kind::GaussianMixture] {
+    for kind in
+        [BaselineKind::SphericalHarmonics, BaselineKind::SphericalGaussians, BaselineKind::GaussianMixture]
+    {
         let fit = |d| {
-            let baseline = Baseline::from_dimension(kind, d, Space::Log).unwrap();
+            let baseline = Baseline::from_dimension(kind, d, TargetSpace::Log).unwrap();
             let fitted = baseline.fit(grid, &image).unwrap();
             assert_eq!(fitted.parameters().len(), baseline.dimension());
             error(&fitted, grid, &image)
@@ -61,11 +66,14 @@ fn every_system_improves_with_its_size_and_counts_its_coefficients() {
 #[test]
 fn harmonics_are_their_own_best_fit_whatever_the_grid() {
     let coefficients: Vec<_> = (0..9).map(|k| [0.3 * f64::from(k), 1.0 - 0.1 * f64::from(k), 0.2]).collect();
-    let truth = Fitted { space: Space::Log, field: Field::Harmonics(Harmonics::new(coefficients).unwrap()) };
+    let truth = Fitted {
+        space: TargetSpace::Log,
+        field: BaselineField::Harmonics(Harmonics::new(coefficients).unwrap()),
+    };
     // coarse and lopsided: a plain projection is off by percents here
     let grid = Equirect::new(9, 7);
     let image = truth.log_radiance(&grid.directions()).into_flattened();
-    let found = Baseline::SphericalHarmonics { order: 2, space: Space::Log }.fit(grid, &image).unwrap();
+    let found = Baseline::SphericalHarmonics { order: 2, space: TargetSpace::Log }.fit(grid, &image).unwrap();
     for (a, b) in found.parameters().iter().zip(truth.parameters()) {
         assert!((a - b).abs() < 1e-5, "{a} and {b}");
     }
@@ -77,7 +85,7 @@ fn a_rotated_image_has_the_rotated_fit() {
     let image = sky(grid);
     let rotated: Vec<f32> =
         image.chunks_exact(96).flat_map(|row| [&row[15..], &row[..15]].concat()).collect();
-    for space in [Space::Log, Space::Linear] {
+    for space in [TargetSpace::Log, TargetSpace::Linear] {
         let baseline = Baseline::SphericalHarmonics { order: 4, space };
         let [a, b] =
             [&image, &rotated].map(|i| baseline.fit(grid, i).unwrap().log_radiance(&grid.directions()));
@@ -91,11 +99,11 @@ fn a_rotated_image_has_the_rotated_fit() {
 #[test]
 fn the_floor_holds_what_has_no_logarithm() {
     let field = Gaussians {
-        lobes: vec![Lobe { axis: [0.0, 0.0, 1.0], sharpness: 1.0, amplitude: [-2.0; 3] }],
+        lobes: vec![SphericalGaussian { axis: [0.0, 0.0, 1.0], sharpness: 1.0, amplitude: [-2.0; 3] }],
         constant: [1.0; 3],
     };
     let mean = field.mean()[0];
-    let fitted = Fitted { space: Space::Linear, field: Field::Gaussians(field) };
+    let fitted = Fitted { space: TargetSpace::Linear, field: BaselineField::Gaussians(field) };
     let [up, down] = fitted.log_radiance(&[[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])[..] else { panic!() };
     assert!((f64::from(up[0]) - (FLOOR * mean).ln()).abs() < 1e-6);
     assert!((f64::from(down[0]) - (1.0 - 2.0 * (-2.0_f64).exp()).ln()).abs() < 1e-6);
@@ -105,7 +113,7 @@ fn the_floor_holds_what_has_no_logarithm() {
 fn what_cannot_be_fitted_is_refused() {
     let grid = Equirect::new(4, 2);
     let refused = |order, image: &[f32]| {
-        let baseline = Baseline::SphericalHarmonics { order, space: Space::Log };
+        let baseline = Baseline::SphericalHarmonics { order, space: TargetSpace::Log };
         baseline.fit(grid, image).unwrap_err().to_string()
     };
     assert!(refused(0, &[0.0; 23]).contains("23 values"));
@@ -131,8 +139,10 @@ fn parameters_say_everything_about_a_fit() {
     let grid = Equirect::new(16, 8);
     let sky: Vec<f32> = grid.directions().iter().flat_map(|d| [d[2], 0.5 * d[0] * d[1], 1.0]).collect();
     let directions = grid.directions();
-    for kind in [Kind::SphericalHarmonics, Kind::SphericalGaussians, Kind::GaussianMixture] {
-        let system = Baseline::from_dimension(kind, 27, Space::Log).unwrap();
+    for kind in
+        [BaselineKind::SphericalHarmonics, BaselineKind::SphericalGaussians, BaselineKind::GaussianMixture]
+    {
+        let system = Baseline::from_dimension(kind, 27, TargetSpace::Log).unwrap();
         let fitted = system.fit(grid, &sky).unwrap();
         let again = Fitted::from_parameters(&system, &fitted.parameters()).unwrap();
         let (a, b) = (fitted.log_radiance(&directions), again.log_radiance(&directions));

@@ -4,37 +4,37 @@ use serde_json::json;
 
 use super::Codec;
 use crate::baseline::gaussians::Search;
-use crate::baseline::{Baseline, Fitted, Kind, Space};
+use crate::baseline::{Baseline, BaselineKind, Fitted, TargetSpace};
 use crate::canonical::Canonical;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 
 /// A basis fitted to each image.
 #[derive(Clone, Debug)]
-pub struct Basis {
+pub struct FittedBasis {
     system: Baseline,
     name: String,
 }
 
-impl Basis {
+impl FittedBasis {
     /// The largest system of this kind, in log radiance, of at most `dimension` coefficients; `quick`: lobes are searched by
     /// [`Search::quick`].
     ///
     /// # Errors
     /// As [`Baseline::from_dimension`].
-    pub fn new(kind: Kind, dimension: usize, quick: bool) -> Result<Self> {
-        let system = Baseline::from_dimension(kind, dimension, Space::Log)?;
+    pub fn new(kind: BaselineKind, dimension: usize, quick: bool) -> Result<Self> {
+        let system = Baseline::from_dimension(kind, dimension, TargetSpace::Log)?;
         let system = if quick { system.searched(Search::quick()) } else { system };
         let name = match kind {
-            Kind::SphericalHarmonics => "SH",
-            Kind::SphericalGaussians => "SG",
-            Kind::GaussianMixture => "SG mixture",
+            BaselineKind::SphericalHarmonics => "SH",
+            BaselineKind::SphericalGaussians => "SG",
+            BaselineKind::GaussianMixture => "SG mixture",
         };
         Ok(Self { name: format!("{name} {}", system.dimension()), system })
     }
 }
 
-impl Codec for Basis {
+impl Codec for FittedBasis {
     fn system(&self) -> &str {
         &self.name
     }
@@ -67,7 +67,7 @@ impl Codec for Basis {
     }
 }
 
-impl Basis {
+impl FittedBasis {
     fn named(&self, error: &Error) -> Error {
         Error::invalid(format!("{}: {error}", self.name))
     }
@@ -81,8 +81,12 @@ mod tests {
     fn a_code_is_as_long_as_it_says_and_gives_the_image_back() {
         let grid = Equirect::new(16, 8);
         let sky: Vec<f32> = grid.directions().iter().flat_map(|d| [d[2], 0.5 * d[0], 1.0]).collect();
-        for kind in [Kind::SphericalHarmonics, Kind::SphericalGaussians, Kind::GaussianMixture] {
-            let basis = Basis::new(kind, 27, false).unwrap();
+        for kind in [
+            BaselineKind::SphericalHarmonics,
+            BaselineKind::SphericalGaussians,
+            BaselineKind::GaussianMixture,
+        ] {
+            let basis = FittedBasis::new(kind, 27, false).unwrap();
             let code = basis.encode(grid, &sky).unwrap();
             assert_eq!((code.len(), basis.dimension()), (27, 27), "{kind:?}");
             let image = basis.decode(grid, &code).unwrap();
@@ -90,11 +94,11 @@ mod tests {
             assert!(worst < 0.3, "{kind:?}: {worst}");
         }
         assert_ne!(
-            Basis::new(Kind::SphericalHarmonics, 27, false).unwrap().key(),
-            Basis::new(Kind::SphericalHarmonics, 147, false).unwrap().key()
+            FittedBasis::new(BaselineKind::SphericalHarmonics, 27, false).unwrap().key(),
+            FittedBasis::new(BaselineKind::SphericalHarmonics, 147, false).unwrap().key()
         );
         // what is kept of a quick search is not taken for the whole one's
-        let key = |quick| Basis::new(Kind::SphericalGaussians, 27, quick).unwrap().key();
+        let key = |quick| FittedBasis::new(BaselineKind::SphericalGaussians, 27, quick).unwrap().key();
         assert_ne!(key(true), key(false));
     }
 }

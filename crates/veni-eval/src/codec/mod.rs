@@ -7,7 +7,7 @@ mod basis;
 mod lobes;
 pub(crate) mod model;
 
-pub use basis::Basis;
+pub use basis::FittedBasis;
 pub use lobes::Lobed;
 pub use model::{Autoencoder, Optimised};
 

@@ -20,8 +20,8 @@ use veni_core::LoadedModel;
 use veni_core::fit::{FitConfig, FitResult, fit_rendered, matching_exposure};
 use veni_data::{Item, Part};
 use veni_fit::shade::{
-    Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss, ShadingForm,
-    Surface, Transfer,
+    Camera, Colour, DistantLights, Material, REFERENCE_FIELD_OF_VIEW, RenderedImage, RenderingLoss,
+    ShadingForm, Surface, Transfer,
 };
 use veni_image::Panorama;
 use veni_image::metrics::{Alignment, psnr};
@@ -188,7 +188,7 @@ fn ball(set: Set, ks: f32) -> Result<Transfer> {
     let white = Colour::Uniform([1.0; 3]);
     let material =
         if ks > 0.0 { Material::blinn_phong(white, ks, SHININESS) } else { Material::lambert(white) };
-    let lights = Lights::equirect(Equirect::new(set.lights, set.lights / 2));
+    let lights = DistantLights::equirect(Equirect::new(set.lights, set.lights / 2));
     Transfer::new(&surface, &material, lights, ShadingForm::Physical)
 }
 

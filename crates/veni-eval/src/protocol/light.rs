@@ -16,6 +16,7 @@ use veni_data::parallel::parallel;
 use veni_data::{Item, Part};
 use veni_light::light::{CompactLight, EnvironmentMap, LightOptions, luminance};
 use veni_light::sphere::{Equirect, ways};
+use veni_light::vector::dot;
 
 /// Titles of the columns behind those that name a system.
 pub(super) const COLUMNS: [&str; 9] = [
@@ -229,7 +230,7 @@ fn irradiance(grid: Equirect, radiance: &[[f32; 3]]) -> Vec<f64> {
     let facing = |way: [f32; 3]| {
         let mut sum = 0.0;
         for (index, (direction, pixel)) in directions.iter().zip(radiance).enumerate() {
-            let cosine: f32 = direction.iter().zip(way).map(|(d, n)| d * n).sum();
+            let cosine = dot(*direction, way);
             if cosine > 0.0 {
                 let weight = grid.solid_angle(index / grid.width) * f64::from(cosine);
                 sum += weight * f64::from(luminance(*pixel));

@@ -17,7 +17,7 @@
 //! | [`inverse_rendering`] | what does the rendered image of a ball tell of the light on it? |
 //! | [`paper`] | all of them but `light`, `spheres`, `photo`, `completion` and `realism`, with published numbers beside ours |
 //!
-//! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`Store`] image by image; a
+//! A protocol takes an [`Evaluation`] and gives a [`Report`]. What takes long is kept in its [`ResultStore`] image by image; a
 //! [`Part`](veni_data::Part) of it can be computed beforehand by `keep`, in processes that know nothing of each other, without tables or
 //! figures. Once all parts are there, `run` finds them and makes both.
 
@@ -52,7 +52,7 @@ use super::codec::{Autoencoder, Codec, Lobed, Optimised};
 use super::figure::{LabelledSheet, Plot};
 use super::fitting::FitSettings;
 use super::lpips::Lpips;
-use super::store::Store;
+use super::store::ResultStore;
 use super::table::Table;
 use crate::Result;
 use veni_core::LoadedModel;
@@ -102,7 +102,7 @@ pub struct Evaluation<'a> {
     /// Seeds and effort.
     pub settings: Settings,
     /// Where results are kept.
-    pub store: &'a Store,
+    pub store: &'a ResultStore,
     /// The folder of figures.
     pub figures: &'a Path,
     /// Observer of progress.

@@ -14,6 +14,7 @@ use veni_data::Part;
 use veni_data::parallel::parallel;
 use veni_image::tonemap::quantile;
 use veni_light::sphere::Equirect;
+use veni_light::vector::{self, dot, length};
 
 /// Pixels along the diameter of a ball.
 const SIZE: usize = 48;
@@ -166,8 +167,8 @@ fn conductor(n: [f64; 3], d: [f64; 3]) -> f64 {
     if l <= 0.0 || v <= 0.0 {
         return 0.0;
     }
-    let half = [0, 1, 2].map(|k| d[k] + VIEW[k]);
-    let h = dot(n, half) / dot(half, half).sqrt();
+    let half = vector::add(d, VIEW);
+    let h = dot(n, half) / length(half);
     let square = ALPHA * ALPHA;
     let t = h * h * (square - 1.0) + 1.0;
     let distribution = square / (std::f64::consts::PI * t * t);
@@ -199,10 +200,6 @@ fn errors(found: &[[f64; 3]], truth: &[[f64; 3]]) -> Errors {
         rms(&|p, t| normal(p, spans[0]) - normal(t, spans[1])),
         angles,
     ]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

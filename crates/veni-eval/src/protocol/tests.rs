@@ -71,7 +71,7 @@ fn evaluated<T>(
     settings: Settings,
     protocol: impl Fn(&Evaluation<'_>) -> T,
 ) -> (T, usize) {
-    let (log, store, figures) = (Log::default(), Store::new(folder), folder.join("figures"));
+    let (log, store, figures) = (Log::default(), ResultStore::new(folder), folder.join("figures"));
     let (subjects, observer) = (subjects, &log);
     let run = Evaluation {
         lobes: &[],

@@ -58,8 +58,8 @@ mod tests {
     use super::super::tests::{decoder, latent};
     use super::*;
     use crate::shade::{
-        Camera, Colour, Lights, Material, REFERENCE_FIELD_OF_VIEW, RenderingLoss, ShadingForm, Surface,
-        Transfer,
+        Camera, Colour, DistantLights, Material, REFERENCE_FIELD_OF_VIEW, RenderingLoss, ShadingForm,
+        Surface, Transfer,
     };
     use veni_light::sphere::Equirect;
 
@@ -73,7 +73,7 @@ mod tests {
         let camera = Camera::framing(place, [0.0; 2], REFERENCE_FIELD_OF_VIEW, [20, 20], 0.05).unwrap();
         let surface = Surface::sphere(&camera, place, 20, 20).unwrap();
         let material = Material::blinn_phong(Colour::Uniform([0.8; 3]), 0.5, 40.0);
-        let lights = Lights::equirect(Equirect::new(16, 8));
+        let lights = DistantLights::equirect(Equirect::new(16, 8));
         let transfer = Transfer::new(&surface, &material, lights, ShadingForm::Physical).unwrap();
         let field = decoder().condition(light).unwrap();
         let photograph = transfer.render(&field.bake(Equirect::new(16, 8)));

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::vector::{Vector, add, cross, narrow, scale, sub, unit};
+use super::unit::unit;
 use crate::{Error, Result};
+use veni_light::vector::{add, cross, narrow, scaled, sub};
 
 /// The horizontal field of view of the reference's renderings, radians (MODEL, Rendered images): 39.6°.
 pub const REFERENCE_FIELD_OF_VIEW: f64 = 0.691_111_2;
@@ -73,7 +74,7 @@ impl Camera {
         // the cone that touches the sphere has half angle asin(r/d)
         let smaller = width.min(height) as f64 / width as f64;
         let half = ((0.5 * field_of_view).tan() * smaller * (1.0 - margin)).atan();
-        let position = sub(centre, scale(forward, radius / half.sin()));
+        let position = sub(centre, scaled(forward, radius / half.sin()));
         let camera = Self::look_at(position, centre, field_of_view)?;
         // the direction is known better than as a difference of points
         let right = [sin_a, -cos_a, 0.0];
@@ -87,12 +88,12 @@ impl Camera {
     }
 
     /// The ray of one pixel.
-    pub(super) fn ray(&self, width: usize, height: usize, column: usize, row: usize) -> Vector {
+    pub(super) fn ray(&self, width: usize, height: usize, column: usize, row: usize) -> [f64; 3] {
         let (w, h) = (width as f64, height as f64);
         let (i, j) = (column as f64, row as f64);
         let tan = (0.5 * self.field_of_view).tan();
-        let across = scale(self.right, tan * (2.0 * i + 1.0 - w) / w);
-        let up = scale(self.up, tan * (h - 2.0 * j - 1.0) / w);
+        let across = scaled(self.right, tan * (2.0 * i + 1.0 - w) / w);
+        let up = scaled(self.up, tan * (h - 2.0 * j - 1.0) / w);
         let ray = unit(add(self.forward, add(across, up)));
         ray.expect("a field of view below π leaves a part along forward")
     }
@@ -116,7 +117,7 @@ impl Camera {
 
     fn check(&self) -> Result<()> {
         let axes = [self.right, self.up, self.forward];
-        let product = |a: usize, b: usize| super::vector::dot(axes[a], axes[b]);
+        let product = |a: usize, b: usize| veni_light::vector::dot(axes[a], axes[b]);
         for a in 0..3 {
             for b in 0..3 {
                 let expected = if a == b { 1.0 } else { 0.0 };
@@ -141,8 +142,8 @@ impl Camera {
 
 #[cfg(test)]
 mod tests {
-    use super::super::vector::wide;
     use super::*;
+    use veni_light::vector::wide;
 
     #[test]
     fn the_corner_pixels_look_where_they_should() {

@@ -2,13 +2,14 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::vector::{Vector, add, cross, dot, narrow, scale, unit};
+use super::unit::unit;
+use veni_light::vector::{add, cross, dot, narrow, scaled};
 
 /// The golden ratio: corners are (0, ±1, ±φ) and cyclic permutations, normalised.
 const PHI: f64 = 1.618_033_988_749_895;
 
 /// Corners, in the reference's order.
-const CORNERS: [Vector; 12] = [
+const CORNERS: [[f64; 3]; 12] = [
     [0.0, 1.0, PHI],
     [0.0, -1.0, PHI],
     [1.0, PHI, 0.0],
@@ -58,10 +59,10 @@ pub(super) fn vertices(at_least: usize) -> Vec<([f32; 3], f32)> {
     }
     let points = order(f);
     let position = |parts: &Parts| {
-        let corner = |(&at, &count): (&usize, &usize)| scale(CORNERS[at], count as f64);
+        let corner = |(&at, &count): (&usize, &usize)| scaled(CORNERS[at], count as f64);
         unit(parts.iter().map(corner).fold([0.0; 3], add)).expect("no face passes through the centre")
     };
-    let positions: Vec<Vector> = points.iter().map(position).collect();
+    let positions: Vec<[f64; 3]> = points.iter().map(position).collect();
     let index: HashMap<&Parts, usize> = points.iter().enumerate().map(|(at, p)| (p, at)).collect();
     let mut angles = vec![0.0; points.len()];
     for face in FACES {
@@ -112,7 +113,7 @@ fn triangles(f: usize) -> Vec<[[usize; 3]; 3]> {
 }
 
 /// Solid angle of a spherical triangle (van Oosterom and Strackee 1983).
-fn solid_angle([a, b, c]: [Vector; 3]) -> f64 {
+fn solid_angle([a, b, c]: [[f64; 3]; 3]) -> f64 {
     let denominator = 1.0 + dot(a, b) + dot(b, c) + dot(c, a);
     2.0 * dot(a, cross(b, c)).abs().atan2(denominator)
 }

@@ -25,11 +25,11 @@ impl ExposureForm {
 }
 
 /// A loss ([`f64`]), its gradient with respect to the log radiance of every light, and with respect to s.
-pub type Evaluation = (f64, Vec<[f32; 3]>, f64);
+pub type LossAndGradients = (f64, Vec<[f32; 3]>, f64);
 
 /// A target image with its [`Transfer`]: a function of the light with its gradient.
 ///
-/// The light is natural-log radiance [L, 3] in the order of [`Transfer::lights`], which for [`Lights::equirect`] is
+/// The light is natural-log radiance [L, 3] in the order of [`Transfer::lights`], which for [`DistantLights::equirect`] is
 /// what the decoder gives for [`Equirect::directions`]. A fit multiplies the gradient with the decoder's own:
 ///
 /// ```
@@ -41,7 +41,7 @@ pub type Evaluation = (f64, Vec<[f32; 3]>, f64);
 /// let camera = Camera::framing(ball, [0.0; 2], REFERENCE_FIELD_OF_VIEW, [24, 24], 0.05)?;
 /// let surface = Surface::sphere(&camera, ball, 24, 24)?;
 /// let material = Material::blinn_phong(Colour::Uniform([1.0; 3]), 0.2, 50.0);
-/// let transfer = Transfer::new(&surface, &material, Lights::equirect(grid), ShadingForm::Physical)?;
+/// let transfer = Transfer::new(&surface, &material, DistantLights::equirect(grid), ShadingForm::Physical)?;
 /// let photograph = transfer.render(&vec![[2.0, 1.0, 0.5]; grid.len()]);
 ///
 /// let image = RenderedImage::new(transfer, &photograph, RenderingLoss::default())?;
@@ -53,7 +53,7 @@ pub type Evaluation = (f64, Vec<[f32; 3]>, f64);
 /// # Ok(()) }
 /// ```
 ///
-/// [`Lights::equirect`]: super::Lights::equirect
+/// [`DistantLights::equirect`]: super::DistantLights::equirect
 /// [`Equirect::directions`]: veni_light::sphere::Equirect::directions
 #[derive(Clone, Debug)]
 pub struct RenderedImage {
@@ -100,7 +100,7 @@ impl RenderedImage {
     ///
     /// # Panics
     /// If there is not one log radiance per light.
-    pub fn evaluate(&self, log_radiance: &[[f32; 3]], log_exposure: f32) -> Evaluation {
+    pub fn evaluate(&self, log_radiance: &[[f32; 3]], log_exposure: f32) -> LossAndGradients {
         let radiance = self.radiance(log_radiance, log_exposure);
         let light = self.transfer.planes(&radiance);
         let (loss, mut gradient) =

@@ -1,18 +1,18 @@
 //! Sets of distant lights.
 
 use super::icosahedron;
-use super::vector::unit_f32;
+use super::unit::unit_f32;
 use crate::{Error, Result};
 use veni_light::sphere::{Equirect, reference};
 
 /// Distant lights: L directions towards them, each with the solid angle ω that it stands for.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Lights {
+pub struct DistantLights {
     directions: Vec<[f32; 3]>,
     solid_angles: Vec<f32>,
 }
 
-impl Lights {
+impl DistantLights {
     /// Lights from any directions (normalised here) and their solid angles in steradians; a sphere's worth adds up
     /// to 4π.
     ///
@@ -88,9 +88,9 @@ mod tests {
     #[test]
     fn solid_angles_cover_the_sphere_once() {
         let sets = [
-            Lights::equirect(Equirect::new(32, 16)),
-            Lights::icosahedron(1, false),
-            Lights::icosahedron(500, false),
+            DistantLights::equirect(Equirect::new(32, 16)),
+            DistantLights::icosahedron(1, false),
+            DistantLights::icosahedron(500, false),
         ];
         for lights in sets {
             let total: f64 = lights.solid_angles().iter().map(|w| f64::from(*w)).sum();
@@ -102,19 +102,19 @@ mod tests {
                 assert!(moment.abs() < 1e-5, "axis {axis}: {moment}");
             }
         }
-        assert_eq!(Lights::icosahedron(93, false).len(), 162);
-        assert!(Lights::icosahedron(93, true).directions().iter().all(|d| d[2] > 0.0));
+        assert_eq!(DistantLights::icosahedron(93, false).len(), 162);
+        assert!(DistantLights::icosahedron(93, true).directions().iter().all(|d| d[2] > 0.0));
     }
 
     #[test]
     fn what_is_no_light_is_refused() {
-        let message = |d: &[[f32; 3]], w: &[f32]| Lights::new(d, w).unwrap_err().to_string();
+        let message = |d: &[[f32; 3]], w: &[f32]| DistantLights::new(d, w).unwrap_err().to_string();
         assert!(message(&[], &[]).contains("one for each"));
         assert!(message(&[[1.0; 3]], &[1.0, 2.0]).contains("1 light directions and 2"));
         assert!(message(&[[1.0; 3], [0.0; 3]], &[1.0; 2]).contains("light 1"));
         assert!(message(&[[f32::NAN; 3]], &[1.0]).contains("nowhere"));
         assert!(message(&[[1.0; 3]], &[-1.0]).contains("-1"));
-        let lights = Lights::new(&[[0.0, 3.0, 4.0]], &[1.0]).unwrap();
+        let lights = DistantLights::new(&[[0.0, 3.0, 4.0]], &[1.0]).unwrap();
         assert_eq!(lights.directions(), [[0.0, 0.6, 0.8]]);
     }
 }

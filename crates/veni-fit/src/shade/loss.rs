@@ -2,9 +2,9 @@
 
 use super::Transfer;
 use super::transfer::check_image;
-use super::vector::dot;
 use crate::{Error, Result};
 use veni_image::tonemap::{REFERENCE_QUANTILE, quantile, srgb, srgb_derivative};
+use veni_light::vector::dot;
 
 /// What [`RenderedImage`](super::RenderedImage) minimises: R is the rendering, T the target, both linear radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]

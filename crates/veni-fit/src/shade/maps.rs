@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use super::vector::{length, narrow, unit_f32, wide};
+use super::unit::unit_f32;
 use crate::{Error, Result};
 use veni_image::{Content, Picture, ReadOptions};
+use veni_light::vector::{length, narrow, wide};
 
 /// A normal counts if its length lies strictly between these (MODEL, Rendered images).
 const LENGTHS: [f64; 2] = [0.5, 1.5];

@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 
 use super::ShadingForm;
-use super::vector::{Vector, add, dot, narrow, scale};
 use crate::{Error, Result};
+use veni_light::vector::{add, dot, narrow, scaled};
 
 /// What [`ShadingForm::Reference`] never goes below, with Blinn-Phong.
 pub(super) const REFERENCE_FLOOR: f32 = 1e-3;
@@ -110,9 +110,9 @@ impl Colour {
 /// per steradian.
 pub(super) struct Lobes {
     form: ShadingForm,
-    normal: Vector,
+    normal: [f64; 3],
     /// The view vector of h.
-    view: Vector,
+    view: [f64; 3],
     /// n · view.
     facing: f64,
     diffuse: f64,
@@ -124,12 +124,12 @@ pub(super) struct Lobes {
 
 impl Lobes {
     /// For a unit normal and the unit camera ray that meets it.
-    pub(super) fn new(form: ShadingForm, normal: Vector, ray: Vector, shininess: f32) -> Self {
+    pub(super) fn new(form: ShadingForm, normal: [f64; 3], ray: [f64; 3], shininess: f32) -> Self {
         let s = f64::from(shininess);
         let (view, diffuse, specular) = match form {
             ShadingForm::Physical => {
                 let normalised = (s + 2.0) * (s + 4.0) / (8.0 * PI * (s + (-0.5 * s).exp2()));
-                (scale(ray, -1.0), FRAC_1_PI, normalised)
+                (scaled(ray, -1.0), FRAC_1_PI, normalised)
             }
             ShadingForm::Reference => (ray, 1.0, (s + 2.0) / (4.0 * (2.0 - (-0.5 * s).exp()))),
         };
@@ -139,13 +139,13 @@ impl Lobes {
 
     /// Lambert: max(n·l, 0), over π in the physical form.
     #[inline]
-    pub(super) fn diffuse(&self, light: Vector) -> f64 {
+    pub(super) fn diffuse(&self, light: [f64; 3]) -> f64 {
         self.diffuse * dot(self.normal, light).max(0.0)
     }
 
     /// Blinn-Phong's lobe. A light exactly opposite to the view vector has no half vector and gives 0.
     #[inline]
-    pub(super) fn specular(&self, light: Vector) -> f64 {
+    pub(super) fn specular(&self, light: [f64; 3]) -> f64 {
         let (cosine, x) = match self.form {
             ShadingForm::Physical => {
                 let cosine = dot(self.normal, light);
@@ -171,14 +171,14 @@ impl Lobes {
 
     /// n·h in single precision, step by step as in the reference implementation, the order of its sums included: with
     /// s = 500, the last bit of this number is 3e-5 of the result.
-    fn reference_cosine(&self, light: Vector) -> f32 {
+    fn reference_cosine(&self, light: [f64; 3]) -> f32 {
         let normalise = |v: [f32; 3]| {
             let length = (v[0] * v[0] + (v[1] * v[1] + v[2] * v[2])).sqrt();
             v.map(|c| c / length.max(1e-12))
         };
         let (light, view, normal) = (normalise(narrow(light)), narrow(self.view), narrow(self.normal));
         let half = normalise([0, 1, 2].map(|c| (light[c] + view[c]) / 2.0));
-        half[0] * normal[0] + half[1] * normal[1] + half[2] * normal[2]
+        dot(half, normal)
     }
 }
 
@@ -187,7 +187,7 @@ mod tests {
     use super::*;
 
     /// ∫ lobe(l) dω over the sphere by the midpoint rule, for a view `tilt` radians from the normal.
-    fn integral(lobes: &Lobes, lobe: impl Fn(&Lobes, Vector) -> f64) -> f64 {
+    fn integral(lobes: &Lobes, lobe: impl Fn(&Lobes, [f64; 3]) -> f64) -> f64 {
         let (rows, columns) = (600, 200);
         let mut sum = 0.0;
         for j in 0..rows {

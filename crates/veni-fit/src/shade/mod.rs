@@ -1,7 +1,7 @@
 //! Shading: what a surface of known shape and material looks like under distant light, and how that changes with
 //! the light.
 //!
-//! Light is a finite set of [`Lights`] at infinity (the pixels of a panorama, with their solid angles). Without shadows
+//! Light is a finite set of [`DistantLights`] at infinity (the pixels of a panorama, with their solid angles). Without shadows
 //! and interreflections, the radiance that leaves a pixel's surface towards the camera is linear in their radiance:
 //!
 //! > R_c = Σ_l f_c(n, v, l) max(n·l, 0) ω_l L_{l,c}
@@ -12,7 +12,7 @@
 //!
 //! | here | what |
 //! |---|---|
-//! | [`Lights`] | directions and solid angles: equirectangular, icosahedral |
+//! | [`DistantLights`] | directions and solid angles: equirectangular, icosahedral |
 //! | [`Material`] | Lambert, Blinn-Phong |
 //! | [`Camera`], [`Surface`], [`Mesh`] | rays; normals of a sphere, a triangle mesh |
 //! | [`NormalMap`], [`read_mask`], [`read_albedo`] | a surface from image files |
@@ -33,14 +33,14 @@ mod material;
 mod raster;
 mod surface;
 mod transfer;
-mod vector;
+mod unit;
 
 #[cfg(test)]
 mod tests;
 
 pub use camera::{Camera, REFERENCE_FIELD_OF_VIEW};
-pub use image::{Evaluation, ExposureForm, RenderedImage};
-pub use lights::Lights;
+pub use image::{ExposureForm, LossAndGradients, RenderedImage};
+pub use lights::DistantLights;
 pub use loss::RenderingLoss;
 pub use maps::{NormalMap, read_albedo, read_mask};
 pub use material::{Colour, Material, Specular};
@@ -57,6 +57,6 @@ pub enum ShadingForm {
     Physical,
     /// MODEL (57): the sum over the lights uses no 1/π; the view vector of Blinn-Phong points *away* from the camera,
     /// its lobe has no cosine and the factor (s + 2)/(4 (2 − e^{−s/2})); its result is at least 1e-3; pixels that
-    /// show no surface are 1. Lights of [`Lights::reference`] belong to it, which have no solid angles either.
+    /// show no surface are 1. Lights of [`DistantLights::reference`] belong to it, which have no solid angles either.
     Reference,
 }

@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::vector::{Vector, add, cross, dot, length, narrow, scale, sub, unit, wide};
+use super::unit::unit;
 use super::{Camera, Surface};
 use crate::{Error, Result};
+use veni_light::vector::{add, cross, dot, length, narrow, scaled, sub, wide};
 
 /// Triangles in space. Corners are in any order of rotation: the side that faces the camera is the outer one.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,11 +22,11 @@ pub struct Mesh {
 /// A triangle as the camera at the origin of space sees it.
 struct Triangle {
     /// Corners relative to the camera.
-    corners: [Vector; 3],
+    corners: [[f64; 3]; 3],
     /// Corner normals, or the flat one three times.
-    normals: [Vector; 3],
+    normals: [[f64; 3]; 3],
     /// Unit normal of its plane.
-    plane: Vector,
+    plane: [f64; 3],
     /// Columns and rows that may show it, ends excluded.
     columns: [usize; 2],
     rows: [usize; 2],
@@ -46,7 +47,7 @@ impl Mesh {
                 (low[c], high[c]) = (low[c].min(p[c]), high[c].max(p[c]));
             }
         }
-        let centre = scale(add(low, high), 0.5);
+        let centre = scaled(add(low, high), 0.5);
         let radius = used().map(|p| length(sub(p, centre))).fold(0.0, f64::max);
         if radius == 0.0 {
             return Err(Error::invalid("the mesh is a single point: there is nothing to see"));
@@ -152,7 +153,7 @@ impl Mesh {
 
 impl Triangle {
     /// Distance along a unit ray from the camera, and the unit normal there.
-    fn hit(&self, ray: Vector) -> Option<(f64, Vector)> {
+    fn hit(&self, ray: [f64; 3]) -> Option<(f64, [f64; 3])> {
         let [a, b, c] = self.corners;
         // volumes spanned with the ray: barycentric weights, with one sign inside; two triangles compute the same number
         // (but for its sign) for the edge that they share
@@ -167,10 +168,10 @@ impl Triangle {
         if !(t > 0.0 && t.is_finite()) {
             return None;
         }
-        let outward = if facing > 0.0 { scale(self.plane, -1.0) } else { self.plane };
-        let parts = [0, 1, 2].map(|k| scale(self.normals[k], weights[k] / total));
+        let outward = if facing > 0.0 { scaled(self.plane, -1.0) } else { self.plane };
+        let parts = [0, 1, 2].map(|k| scaled(self.normals[k], weights[k] / total));
         let normal = unit(add(add(parts[0], parts[1]), parts[2])).unwrap_or(outward);
-        Some((t, if dot(normal, outward) < 0.0 { scale(normal, -1.0) } else { normal }))
+        Some((t, if dot(normal, outward) < 0.0 { scaled(normal, -1.0) } else { normal }))
     }
 }
 

@@ -1,8 +1,9 @@
 //! What a camera sees of a shape: a normal and a ray for every pixel.
 
-use super::vector::{add, dot, narrow, scale, sub, unit, unit_f32, wide};
+use super::unit::{unit, unit_f32};
 use super::{Camera, NormalMap};
 use crate::{Error, Result};
+use veni_light::vector::{add, dot, narrow, scaled, sub, wide};
 
 /// An image of W × H pixels, row-major, some of which show the surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,7 +85,7 @@ impl Surface {
             let discriminant = along * along - dot(to_centre, to_centre) + radius * radius;
             let t = along - discriminant.max(0.0).sqrt();
             let hit = discriminant >= 0.0 && t > 0.0;
-            let normal = hit.then(|| unit(add(scale(ray, t), scale(to_centre, -1.0)))).flatten();
+            let normal = hit.then(|| unit(add(scaled(ray, t), scaled(to_centre, -1.0)))).flatten();
             normal.map_or([0.0; 3], narrow)
         };
         let normals: Vec<_> = rays.iter().map(normal).collect();

@@ -13,7 +13,7 @@ fn ball(size: usize) -> Surface {
 }
 
 /// Light of many directions and colours.
-fn sky(lights: &Lights) -> Vec<[f32; 3]> {
+fn sky(lights: &DistantLights) -> Vec<[f32; 3]> {
     let log = |d: &[f32; 3]| [d[0] + 0.5 * d[2], 0.3 - d[1], (3.0 * d[0]).sin() * d[2]];
     lights.directions().iter().map(|d| log(d).map(f32::exp)).collect()
 }
@@ -33,7 +33,8 @@ fn materials(pixels: usize) -> [(&'static str, Material); 4] {
 fn in_a_white_furnace_a_surface_has_the_colour_of_its_albedo() {
     let (surface, grid) = (ball(12), Equirect::new(128, 64));
     let material = Material::lambert(Colour::Uniform([0.8, 0.5, 0.1]));
-    let transfer = Transfer::new(&surface, &material, Lights::equirect(grid), ShadingForm::Physical).unwrap();
+    let transfer =
+        Transfer::new(&surface, &material, DistantLights::equirect(grid), ShadingForm::Physical).unwrap();
     for (value, valid) in transfer.render(&vec![[3.0; 3]; grid.len()]).iter().zip(surface.valid()) {
         let expected = if *valid { [2.4, 1.5, 0.3] } else { [0.0; 3] };
         for (v, e) in value.iter().zip(expected) {
@@ -42,7 +43,8 @@ fn in_a_white_furnace_a_surface_has_the_colour_of_its_albedo() {
     }
     // a shiny surface loses some light at grazing angles, and gains none
     let shiny = Material::blinn_phong(Colour::Uniform([1.0; 3]), 0.6, 50.0);
-    let transfer = Transfer::new(&surface, &shiny, Lights::equirect(grid), ShadingForm::Physical).unwrap();
+    let transfer =
+        Transfer::new(&surface, &shiny, DistantLights::equirect(grid), ShadingForm::Physical).unwrap();
     let image = transfer.render(&vec![[1.0; 3]; grid.len()]);
     for k in (0..image.len()).filter(|k| surface.valid()[*k]) {
         let facing = -(0..3).map(|c| surface.normals()[k][c] * surface.rays()[k][c]).sum::<f32>();
@@ -55,7 +57,8 @@ fn in_a_white_furnace_a_surface_has_the_colour_of_its_albedo() {
 fn lambert_under_a_hemisphere_and_under_a_cosine_lobe() {
     let (surface, grid) = (ball(16), Equirect::new(256, 128));
     let white = Material::lambert(Colour::Uniform([1.0; 3]));
-    let transfer = Transfer::new(&surface, &white, Lights::equirect(grid), ShadingForm::Physical).unwrap();
+    let transfer =
+        Transfer::new(&surface, &white, DistantLights::equirect(grid), ShadingForm::Physical).unwrap();
     let render = |light: &dyn Fn(f32) -> f32| {
         let radiance: Vec<_> = grid.directions().iter().map(|d| [light(d[2]); 3]).collect();
         transfer.render(&radiance)
@@ -78,7 +81,8 @@ fn lambert_under_a_hemisphere_and_under_a_cosine_lobe() {
 fn a_mirror_like_lobe_shows_the_sky_in_the_mirror_direction() {
     let (surface, grid) = (ball(10), Equirect::new(256, 128));
     let mirror = Material::blinn_phong(Colour::Uniform([0.0; 3]), 1.0, 20_000.0);
-    let transfer = Transfer::new(&surface, &mirror, Lights::equirect(grid), ShadingForm::Physical).unwrap();
+    let transfer =
+        Transfer::new(&surface, &mirror, DistantLights::equirect(grid), ShadingForm::Physical).unwrap();
     let light: Vec<_> = grid.directions().iter().map(|d| [1.5 + d[0], 1.5 + d[1], 1.5 + d[2]]).collect();
     let image = transfer.render(&light);
     for k in (0..image.len()).filter(|k| surface.valid()[*k]) {
@@ -99,7 +103,7 @@ fn rows_computed_on_the_fly_are_those_that_would_be_stored() {
     let surface = ball(9);
     for form in [ShadingForm::Physical, ShadingForm::Reference] {
         for (name, material) in materials(81) {
-            let lights = Lights::icosahedron(150, false);
+            let lights = DistantLights::icosahedron(150, false);
             let light = sky(&lights);
             let [stored, fly] = [DEFAULT_MEMORY, 0]
                 .map(|m| Transfer::with_memory(&surface, &material, lights.clone(), form, m).unwrap());
@@ -115,7 +119,7 @@ fn rows_computed_on_the_fly_are_those_that_would_be_stored() {
 fn pulling_back_is_the_transpose_of_rendering() {
     let surface = ball(11);
     for (name, material) in materials(121) {
-        let lights = Lights::icosahedron(150, false);
+        let lights = DistantLights::icosahedron(150, false);
         let transfer = Transfer::new(&surface, &material, lights.clone(), ShadingForm::Physical).unwrap();
         let (light, wave) = (sky(&lights), |k: usize| (k as f32 * 0.7).sin());
         let gradient: Vec<_> = (0..121).map(|k| [wave(k), wave(3 * k), wave(5 * k)]).collect();
@@ -136,7 +140,7 @@ fn pixels_of_one_normal_share_a_row() {
     let rays = Camera::reference().rays(8, 8);
     let surface = Surface::new([8, 8], &normals, &rays, None).unwrap();
     let map = Colour::Map((0..64).map(|k| [k as f32 / 64.0; 3]).collect());
-    let lights = Lights::icosahedron(42, false);
+    let lights = DistantLights::icosahedron(42, false);
     let bytes = 48 * 4;
     let flat = Transfer::with_memory(
         &surface,
@@ -184,7 +188,7 @@ fn gradients_are_those_of_the_loss() {
         losses.into_iter().zip([ExposureForm::Natural, ExposureForm::Reference, ExposureForm::Natural])
     {
         for (name, material) in materials(144) {
-            let lights = Lights::icosahedron(90, false);
+            let lights = DistantLights::icosahedron(90, false);
             let transfer = Transfer::new(&surface, &material, lights.clone(), ShadingForm::Physical).unwrap();
             // a target of other light, so that no difference is near the kink at 0
             let target = transfer.render(&vec![[9.0, 0.3, 4.0]; lights.len()]);
@@ -199,7 +203,7 @@ fn gradients_are_those_of_the_loss() {
 fn the_light_that_made_an_image_has_no_loss() {
     let surface = ball(12);
     for loss in [RenderingLoss::default(), RenderingLoss::ReferenceLog, RenderingLoss::demo()] {
-        let lights = Lights::equirect(Equirect::new(16, 8));
+        let lights = DistantLights::equirect(Equirect::new(16, 8));
         let material = Material::blinn_phong(Colour::Uniform([0.9; 3]), 0.3, 20.0);
         let transfer = Transfer::new(&surface, &material, lights.clone(), ShadingForm::Physical).unwrap();
         let light = sky(&lights);
@@ -223,7 +227,8 @@ fn what_does_not_fit_together_is_refused() {
     let surface = ball(8);
     let white = Material::lambert(Colour::Uniform([1.0; 3]));
     let transfer =
-        Transfer::new(&surface, &white, Lights::icosahedron(12, false), ShadingForm::Physical).unwrap();
+        Transfer::new(&surface, &white, DistantLights::icosahedron(12, false), ShadingForm::Physical)
+            .unwrap();
     let message = |target: &[[f32; 3]], loss| {
         RenderedImage::new(transfer.clone(), target, loss).unwrap_err().to_string()
     };

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::kernel::{self, LANES, ROWS};
 use super::material::{Lobes, REFERENCE_FLOOR};
-use super::vector::wide;
-use super::{Colour, Lights, Material, ShadingForm, Surface};
+use super::{Colour, DistantLights, Material, ShadingForm, Surface};
 use crate::{Error, Result};
+use veni_light::vector::wide;
 
 /// The memory that [`Transfer::new`] may take for its matrix: 512 MiB.
 pub const DEFAULT_MEMORY: usize = 512 << 20;
@@ -27,7 +27,7 @@ const PARTS: usize = 32;
 pub struct Transfer {
     size: [usize; 2],
     form: ShadingForm,
-    lights: Lights,
+    lights: DistantLights,
     lobes: LobeRows,
     shininess: f32,
     /// The result is at least this.
@@ -69,7 +69,12 @@ impl Transfer {
     ///
     /// # Errors
     /// As [`Transfer::with_memory`].
-    pub fn new(surface: &Surface, material: &Material, lights: Lights, form: ShadingForm) -> Result<Self> {
+    pub fn new(
+        surface: &Surface,
+        material: &Material,
+        lights: DistantLights,
+        form: ShadingForm,
+    ) -> Result<Self> {
         Self::with_memory(surface, material, lights, form, DEFAULT_MEMORY)
     }
 
@@ -81,7 +86,7 @@ impl Transfer {
     pub fn with_memory(
         surface: &Surface,
         material: &Material,
-        lights: Lights,
+        lights: DistantLights,
         form: ShadingForm,
         bytes: usize,
     ) -> Result<Self> {
@@ -121,7 +126,7 @@ impl Transfer {
     }
 
     /// The lights, in the order in which their radiance is given.
-    pub fn lights(&self) -> &Lights {
+    pub fn lights(&self) -> &DistantLights {
         &self.lights
     }
 

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use veni_gpu::adapters::Opened;
-use veni_gpu::shader::{self, Weights};
+use veni_gpu::shader::{self, WeightPrecision};
 use veni_gpu::wgpu::{self, BufferUsages};
 use veni_gpu::{GpuDecoder, GpuLatents, GpuLight, read_back};
 
@@ -31,7 +31,7 @@ impl Sky {
         let Some((decoder, _)) = &self.field else {
             return format!("{light}\nfn sky(d: vec3f) -> vec3f {{ return veni_light_radiance(d); }}\n");
         };
-        let enable = if decoder.weights() == Weights::Half { "enable f16;\n" } else { "" };
+        let enable = if decoder.weights() == WeightPrecision::Half { "enable f16;\n" } else { "" };
         let (bindings, field) =
             (shader::field_bindings(2, 0, decoder.weights()), shader::field(decoder.sizes()));
         format!(

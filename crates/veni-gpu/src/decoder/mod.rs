@@ -17,7 +17,7 @@ pub(crate) use target::{count, texture_grid};
 
 use crate::buffers::storage;
 use crate::error::{Error, Result};
-use crate::shader::{Kernel, PackedModel, Sizes, Weights, pack_model};
+use crate::shader::{Kernel, PackedModel, Sizes, WeightPrecision, pack_model};
 use pipelines::Pipelines;
 
 /// Which kernel runs.
@@ -43,7 +43,7 @@ pub struct GpuDecoder {
     sizes: Sizes,
     model: String,
     kernel: Kernel,
-    weights: Weights,
+    weights: WeightPrecision,
     matrices: Buffer,
     vectors: Buffer,
     /// The list of a grid without lights.
@@ -70,7 +70,7 @@ impl GpuDecoder {
         let decoder = model.decoder()?;
         let packed = pack_model(model);
         let (kernel, half) = choose(device, &packed, choice)?;
-        let weights = if half.is_some() { Weights::Half } else { Weights::Single };
+        let weights = if half.is_some() { WeightPrecision::Half } else { WeightPrecision::Single };
         let bytes = match &half {
             Some(half) => bytemuck::cast_slice(half.as_slice()),
             None => bytemuck::cast_slice(packed.matrices.0.as_slice()),
@@ -105,7 +105,7 @@ impl GpuDecoder {
     }
 
     /// Precision of [`GpuDecoder::matrices`].
-    pub fn weights(&self) -> Weights {
+    pub fn weights(&self) -> WeightPrecision {
         self.weights
     }
 

@@ -12,7 +12,7 @@ use wgpu::{
 
 use crate::error::Result;
 use crate::scope::guarded;
-use crate::shader::{Binding, Directions, ENTRY_POINT, Request, Store, TexelFormat, Variant};
+use crate::shader::{Binding, Directions, ENTRY_POINT, Request, StorageFormat, Store, Variant};
 
 /// A kernel and the layout of its group 0.
 #[derive(Debug)]
@@ -84,9 +84,9 @@ fn entry(binding: u32, what: Binding) -> BindGroupLayoutEntry {
     BindGroupLayoutEntry { binding, visibility: ShaderStages::COMPUTE, ty, count: None }
 }
 
-fn texture_format(format: TexelFormat) -> TextureFormat {
+fn texture_format(format: StorageFormat) -> TextureFormat {
     match format {
-        TexelFormat::Rgba32Float => TextureFormat::Rgba32Float,
-        TexelFormat::Rgba16Float => TextureFormat::Rgba16Float,
+        StorageFormat::Rgba32Float => TextureFormat::Rgba32Float,
+        StorageFormat::Rgba16Float => TextureFormat::Rgba16Float,
     }
 }

@@ -6,7 +6,7 @@ use veni_light::sphere::Frame;
 use wgpu::{Buffer, BufferUsages, Texture, TextureDimension, TextureFormat, TextureUsages};
 
 use crate::error::{Error, Result};
-use crate::shader::{Directions, Grid, Request, Store, TexelFormat};
+use crate::shader::{Directions, Grid, Request, StorageFormat, Store};
 
 /// Description of a bake: make it by one of its constructors, change it by its methods, and hand it to
 /// [`GpuDecoder::bake`](super::GpuDecoder::bake).
@@ -146,10 +146,10 @@ impl<'a> Bake<'a> {
 }
 
 /// Grid and texels of a texture that can be written.
-pub(crate) fn texture_grid(texture: &Texture, cube: bool, latents: u32) -> Result<(Grid, TexelFormat)> {
+pub(crate) fn texture_grid(texture: &Texture, cube: bool, latents: u32) -> Result<(Grid, StorageFormat)> {
     let format = match texture.format() {
-        TextureFormat::Rgba32Float => TexelFormat::Rgba32Float,
-        TextureFormat::Rgba16Float => TexelFormat::Rgba16Float,
+        TextureFormat::Rgba32Float => StorageFormat::Rgba32Float,
+        TextureFormat::Rgba16Float => StorageFormat::Rgba16Float,
         other => {
             return Err(Error::invalid(format!(
                 "the target texture has the format {other:?}; radiance goes into Rgba32Float or Rgba16Float"

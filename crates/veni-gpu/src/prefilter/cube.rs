@@ -6,7 +6,7 @@ use wgpu::Texture;
 
 use crate::decoder::{Bake, texture_grid};
 use crate::error::{Error, Result};
-use crate::shader::{Grid, TexelFormat};
+use crate::shader::{Grid, StorageFormat};
 
 /// Description of a prefiltered cube map: make it, change it by its methods, and hand it to
 /// [`GpuPrefilter::bake`](super::GpuPrefilter::bake).
@@ -52,7 +52,7 @@ impl<'a> PrefilteredCube<'a> {
     }
 
     /// Its chain of levels and its texels, once the texture is known to fit.
-    pub(super) fn levels(&self, latents: u32) -> Result<(Levels, TexelFormat)> {
+    pub(super) fn levels(&self, latents: u32) -> Result<(Levels, StorageFormat)> {
         let (grid, format) = texture_grid(self.texture, true, latents)?;
         if !self.rotation.is_finite() {
             return Err(Error::invalid(format!("a rotation by {}: it must be finite", self.rotation)));

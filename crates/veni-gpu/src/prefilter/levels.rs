@@ -16,7 +16,7 @@ use crate::buffers::{filled, storage};
 use crate::decoder::{GpuDecoder, GpuLatents};
 use crate::error::{Error, Result};
 use crate::scope::guarded;
-use crate::shader::{Glints, LEVEL_ENTRY_POINT, Level, TexelFormat, level_source};
+use crate::shader::{Glints, LEVEL_ENTRY_POINT, Level, StorageFormat, level_source};
 
 /// Most layers that a dispatch covers: WebGPU's limit on its third dimension.
 const MAX_LAYERS: u32 = 65_535;
@@ -27,7 +27,7 @@ pub(super) struct Chains(Mutex<Known>);
 
 #[derive(Debug, Default)]
 struct Known {
-    kernels: HashMap<TexelFormat, Arc<Kernel>>,
+    kernels: HashMap<StorageFormat, Arc<Kernel>>,
     gains: Vec<(Levels, Arc<Gains>)>,
 }
 
@@ -131,7 +131,7 @@ impl GpuPrefilter {
     fn requests(
         &self,
         levels: Levels,
-        format: TexelFormat,
+        format: StorageFormat,
         gains: &Gains,
         cube: &PrefilteredCube<'_>,
         stride: u32,
@@ -174,7 +174,7 @@ impl Chains {
         &self,
         device: &Device,
         levels: Levels,
-        format: TexelFormat,
+        format: StorageFormat,
         degree: usize,
     ) -> Result<(Arc<Kernel>, Arc<Gains>)> {
         // a panic elsewhere leaves the map as it was
@@ -197,10 +197,10 @@ impl Chains {
 }
 
 impl Kernel {
-    fn new(device: &Device, format: TexelFormat) -> Self {
+    fn new(device: &Device, format: StorageFormat) -> Self {
         let texture = match format {
-            TexelFormat::Rgba32Float => TextureFormat::Rgba32Float,
-            TexelFormat::Rgba16Float => TextureFormat::Rgba16Float,
+            StorageFormat::Rgba32Float => TextureFormat::Rgba32Float,
+            StorageFormat::Rgba16Float => TextureFormat::Rgba16Float,
         };
         let uniform = Access::Uniform { bytes: Level::BYTES as u64, dynamic: true };
         let (read, texture) = (Access::Read, Access::Texture(texture));

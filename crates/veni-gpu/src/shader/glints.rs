@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 
 use veni_light::light::sh::{Basis, light_bands};
 use veni_light::light::{CompactLight, Lights, lobe_gains};
+use veni_light::vector::{unit, wide};
 
 /// Steps of a table; one more entry, and one for what is rounded beyond it.
 const STEPS: usize = 1024;
@@ -130,9 +131,7 @@ pub fn pack_light_harmonics(degree: usize, lights: &[Lights]) -> Vec<[f32; 4]> {
     for lights in lights {
         let mut sum = vec![[0.0; 3]; basis.len()];
         for light in lights.iter() {
-            let direction = light.direction.map(f64::from);
-            let length = direction.iter().map(|c| c * c).sum::<f64>().sqrt();
-            basis.evaluate(direction.map(|c| c / length), &mut values);
+            basis.evaluate(unit(wide(light.direction)), &mut values);
             let bands = light_bands(light, degree);
             for (index, (sum, y)) in sum.iter_mut().zip(&values).enumerate() {
                 let factor = bands[index.isqrt()] * y;

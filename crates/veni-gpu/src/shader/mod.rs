@@ -45,7 +45,7 @@ pub use spectrum::{
     LEVEL_ENTRY_POINT, MAX_DEGREE, SPECTRUM_ENTRY_POINTS, SpectrumTables, level_source, spectrum_source,
 };
 pub use text::{field, field_bindings, field_module, probe_source};
-pub use variant::{Binding, Directions, Kernel, MAX_GROUPS, Store, TexelFormat, Variant, Weights};
+pub use variant::{Binding, Directions, Kernel, MAX_GROUPS, StorageFormat, Store, Variant, WeightPrecision};
 
 /// Name of the entry point of every kernel.
 pub const ENTRY_POINT: &str = "veni_bake";

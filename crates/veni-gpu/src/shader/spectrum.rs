@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use veni_light::light::gauss_legendre;
 use veni_light::light::sh::Basis;
 
-use super::TexelFormat;
+use super::StorageFormat;
 
 /// Names of the entry points of [`spectrum_source`], in the order in which they run: both over 64 invocations of x, and latents
 /// along z.
@@ -25,7 +25,7 @@ pub fn spectrum_source() -> &'static str {
 
 /// The module that turns harmonics into a level. Group 0: the uniform [`Level`](super::Level); steps, gains and coefficients (without
 /// lights), read-only; a write-only storage texture (2D array of six layers per latent); lights ([`Glints`](super::Glints)), read-only.
-pub fn level_source(format: TexelFormat) -> String {
+pub fn level_source(format: StorageFormat) -> String {
     let level = include_str!("../../shaders/level.wgsl").replace("VENI_FORMAT", format.wgsl());
     [&level, include_str!("../../shaders/cube.wgsl")].join("\n")
 }

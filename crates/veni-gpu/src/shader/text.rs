@@ -1,6 +1,6 @@
 //! Assembly of WGSL: one file per stage, constants in front, repeated lines written out.
 
-use super::{Sizes, Weights};
+use super::{Sizes, WeightPrecision};
 
 pub(super) const LAYOUT: &str = include_str!("../../shaders/layout.wgsl");
 pub(super) const TURNS: &str = include_str!("../../shaders/turns.wgsl");
@@ -28,9 +28,9 @@ pub fn field(sizes: Sizes) -> String {
     expand(&[constants.as_str(), LAYOUT, ENCODE, FIELD].join("\n"), sizes)
 }
 
-/// The three declarations that [`field`] needs, in a group and from a binding on. With [`Weights::Half`] the shader that
+/// The three declarations that [`field`] needs, in a group and from a binding on. With [`WeightPrecision::Half`] the shader that
 /// they go into begins with `enable f16;`.
-pub fn field_bindings(group: u32, first: u32, weights: Weights) -> String {
+pub fn field_bindings(group: u32, first: u32, weights: WeightPrecision) -> String {
     let weight = weights.wgsl();
     let declaration = |i: u32, name: &str, of: &str| {
         let binding = first + i;
@@ -47,7 +47,7 @@ pub fn field_bindings(group: u32, first: u32, weights: Weights) -> String {
 /// passes modules on in a form that has no f16, so the weights are f32: those of a decoder made with
 /// `KernelChoice::SingleWeights`, or [`pack_model`](super::pack_model)'s.
 pub fn field_module(sizes: Sizes, group: u32, first: u32) -> String {
-    let bindings = field_bindings(group, first, Weights::Single);
+    let bindings = field_bindings(group, first, WeightPrecision::Single);
     format!("#define_import_path veni::field\n\n{bindings}\n{}", field(sizes))
 }
 

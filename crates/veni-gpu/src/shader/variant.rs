@@ -46,21 +46,21 @@ pub enum Directions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Store {
     /// A storage texture (2D array).
-    Texture(TexelFormat),
+    Texture(StorageFormat),
     /// A buffer of vec4f.
     Buffer,
 }
 
 /// Texels that WebGPU can store and that hold radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum TexelFormat {
+pub enum StorageFormat {
     /// Four f32.
     Rgba32Float,
     /// Four f16; radiance beyond 65504 is clamped to it.
     Rgba16Float,
 }
 
-impl TexelFormat {
+impl StorageFormat {
     /// Its name in WGSL.
     pub fn wgsl(self) -> &'static str {
         match self {
@@ -80,14 +80,14 @@ impl TexelFormat {
 
 /// Precision of the matrix buffer. Sums are f32 in either.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Weights {
+pub enum WeightPrecision {
     /// f32.
     Single,
     /// f16 (WGSL `f16`): half the traffic, and the same numbers where the model is stored in f16.
     Half,
 }
 
-impl Weights {
+impl WeightPrecision {
     /// Type of an element of `veni_matrices` in WGSL.
     pub fn wgsl(self) -> &'static str {
         match self {
@@ -105,7 +105,7 @@ pub struct Variant {
     /// How it works.
     pub kernel: Kernel,
     /// Precision of the matrices.
-    pub weights: Weights,
+    pub weights: WeightPrecision,
     /// Where directions come from.
     pub directions: Directions,
     /// Where radiance goes.
@@ -122,7 +122,7 @@ pub enum Binding {
     /// [`Request::to_bytes`].
     Uniform,
     /// A write-only storage texture, viewed as a 2D array.
-    Texture(TexelFormat),
+    Texture(StorageFormat),
 }
 
 /// How "tiled" divides its workgroup memory.
@@ -166,7 +166,7 @@ impl Variant {
     /// If it is not [possible](Self::is_possible).
     pub fn source(&self) -> String {
         let mut header = String::new();
-        if self.weights == Weights::Half {
+        if self.weights == WeightPrecision::Half {
             header.push_str("enable f16;\n");
         }
         header.push_str(&text::constants(self.sizes, "override"));
@@ -320,7 +320,7 @@ mod tests {
         for hidden in [128, 200, 700] {
             let sizes = Sizes { latents: 9, hidden, layers: 6 };
             let kernel = Kernel::Tiled { memory: 16_384, subgroups: false };
-            let (weights, directions, store) = (Weights::Single, Directions::Grid, Store::Buffer);
+            let (weights, directions, store) = (WeightPrecision::Single, Directions::Grid, Store::Buffer);
             let variant = Variant { sizes, kernel, weights, directions, store };
             let tile = variant.tile();
             for (width, height, latents) in [(1, 1, 1), (1024, 512, 1), (16_384, 8192, 1), (512, 256, 65_535)]

@@ -1,6 +1,6 @@
 //! Targets: textures, rows, batches, ranges of values.
 
-use veni_gpu::read_back::{Picture, bake_rows};
+use veni_gpu::read_back::{BakeLayout, bake_rows};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::TextureFormat;
 use veni_gpu::{Bake, Error, GpuDecoder};
@@ -93,11 +93,11 @@ fn rows_come_in_bands_and_in_order() {
     let latents = decoder.condition(&gpu.opened.queue, &latent).unwrap();
     // 8192 × 520 takes three bands of 32 MiB: the buffer of the first is used again for the third
     let (width, height) = (8192u32, 520u32);
-    let picture = Picture { grid: Grid::Equirect { width, height }, frame: Default::default() };
+    let layout = BakeLayout { grid: Grid::Equirect { width, height }, frame: Default::default() };
     let field = model.decoder().unwrap().condition(&latent).unwrap();
     let grid = Equirect::new(width as usize, height as usize);
     let mut next = 0;
-    bake_rows::<Error>(&decoder, &gpu.opened.queue, &latents, picture, |row, pixels| {
+    bake_rows::<Error>(&decoder, &gpu.opened.queue, &latents, layout, |row, pixels| {
         assert_eq!(row, next);
         next += 1;
         if row % 100 == 7 || (254..258).contains(&row) || row >= 510 {
@@ -119,9 +119,9 @@ fn rows_of_a_batch_are_those_of_its_first_latent() {
     let model = filler(4, 24, 2);
     let decoder = GpuDecoder::new(&gpu.opened.device, &model).unwrap();
     let latents = decoder.condition_batch(&gpu.opened.queue, &[latent(4, 1), latent(4, 2)]).unwrap();
-    let picture = Picture { grid: Grid::Equirect { width: 20, height: 10 }, frame: Default::default() };
+    let layout = BakeLayout { grid: Grid::Equirect { width: 20, height: 10 }, frame: Default::default() };
     let mut found = Vec::new();
-    bake_rows::<Error>(&decoder, &gpu.opened.queue, &latents, picture, |_, row| {
+    bake_rows::<Error>(&decoder, &gpu.opened.queue, &latents, layout, |_, row| {
         found.extend(row.iter().map(|rgb| rgb.map(f32::ln)));
         Ok(())
     })

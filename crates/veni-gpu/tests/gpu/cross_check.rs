@@ -1,7 +1,7 @@
 //! The GPU against the CPU's field.
 
 use veni_gpu::decoder::KernelChoice;
-use veni_gpu::shader::{Grid, Kernel, Weights};
+use veni_gpu::shader::{Grid, Kernel, WeightPrecision};
 use veni_gpu::{Bake, GpuDecoder};
 use veni_light::model::Model;
 use veni_light::sphere::{CubeFace, Equirect, Frame};
@@ -81,8 +81,11 @@ fn pretrained_model_with_all_the_device_has() {
     let device = &gpu.opened.device;
     let weights = |choice| GpuDecoder::with_kernel(device, &model, choice).unwrap().weights();
     let f16 = device.features().contains(veni_gpu::wgpu::Features::SHADER_F16);
-    assert_eq!(weights(KernelChoice::Auto), if f16 { Weights::Half } else { Weights::Single });
-    assert_eq!(weights(KernelChoice::SingleWeights), Weights::Single);
+    assert_eq!(
+        weights(KernelChoice::Auto),
+        if f16 { WeightPrecision::Half } else { WeightPrecision::Single }
+    );
+    assert_eq!(weights(KernelChoice::SingleWeights), WeightPrecision::Single);
 }
 
 /// Sums within subgroups, on adapters whose subgroups hold the groups of a narrow decoder.

@@ -1,6 +1,6 @@
 //! What does not fit is refused by name, and the host's device goes on.
 
-use veni_gpu::read_back::{self, Picture, bake_rows};
+use veni_gpu::read_back::{self, BakeLayout, bake_rows};
 use veni_gpu::shader::Grid;
 use veni_gpu::wgpu::{BufferUsages, TextureFormat, TextureUsages};
 use veni_gpu::{Bake, Error, GpuDecoder};
@@ -71,8 +71,8 @@ fn what_does_not_fit_is_named() {
         Grid::Cube { size: u32::MAX },
         Grid::List { count: 8 },
     ] {
-        let picture = Picture { grid, frame: Frame::default() };
-        let refused = bake_rows::<Error>(&decoder, queue, &latents, picture, |_, _| Ok(())).unwrap_err();
+        let layout = BakeLayout { grid, frame: Frame::default() };
+        let refused = bake_rows::<Error>(&decoder, queue, &latents, layout, |_, _| Ok(())).unwrap_err();
         assert!(matches!(refused, Error::Invalid(_)), "{grid:?}: {refused:?}");
     }
     for size in [0, 20] {

@@ -3,8 +3,8 @@
 
 use veni_gpu::shader::twin::{Twin, listed, stored};
 use veni_gpu::shader::{
-    Binding, Directions, ENTRY_POINT, Grid, Kernel, Request, Sizes, Store, Variant, Weights, pack_latent,
-    pack_model,
+    Binding, Directions, ENTRY_POINT, Grid, Kernel, Request, Sizes, Store, Variant, WeightPrecision,
+    pack_latent, pack_model,
 };
 use veni_gpu::wgpu::{self, BufferUsages};
 use veni_light::latent::Latent;
@@ -133,7 +133,7 @@ impl Work {
 /// A list of directions to a buffer, by default limits.
 pub(crate) fn list_variant(sizes: Sizes, kernel: Kernel) -> Variant {
     let (directions, store) = (Directions::Buffer, Store::Buffer);
-    Variant { sizes, kernel, weights: Weights::Single, directions, store }
+    Variant { sizes, kernel, weights: WeightPrecision::Single, directions, store }
 }
 
 pub(crate) const TILED: Kernel = Kernel::Tiled { memory: 16_384, subgroups: false };

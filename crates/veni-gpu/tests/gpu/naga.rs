@@ -3,7 +3,7 @@
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use veni_gpu::shader::{
-    self, Binding, Directions, ENTRY_POINT, Kernel, Sizes, Store, TexelFormat, Variant, Weights,
+    self, Binding, Directions, ENTRY_POINT, Kernel, Sizes, StorageFormat, Store, Variant, WeightPrecision,
 };
 
 const PAPER: Sizes = Sizes { latents: 9, hidden: 128, layers: 6 };
@@ -37,15 +37,15 @@ fn variants() -> Vec<Variant> {
     let kernels =
         [Kernel::Each, tiled(16_384, false), tiled(16_384, true), tiled(32_768, false), tiled(65_536, true)];
     let ends = [
-        (Directions::Grid, Store::Texture(TexelFormat::Rgba32Float)),
-        (Directions::Grid, Store::Texture(TexelFormat::Rgba16Float)),
+        (Directions::Grid, Store::Texture(StorageFormat::Rgba32Float)),
+        (Directions::Grid, Store::Texture(StorageFormat::Rgba16Float)),
         (Directions::Grid, Store::Buffer),
         (Directions::Buffer, Store::Buffer),
     ];
     let mut all = Vec::new();
     for sizes in sizes {
         for kernel in kernels {
-            for weights in [Weights::Single, Weights::Half] {
+            for weights in [WeightPrecision::Single, WeightPrecision::Half] {
                 for (directions, store) in ends {
                     let variant = Variant { sizes, kernel, weights, directions, store };
                     if variant.is_possible() {
@@ -120,8 +120,8 @@ fn the_function_pastes_into_a_shader_of_its_own() {
             let up = vec3f(0.0, 0.0, 1.0);
             out[id.x] = vec4f(veni_radiance(vec3f(0.0, 0.6, 0.8)) + veni_log_radiance(up) + veni_lights(up), 1.0);
         }";
-    for weights in [Weights::Single, Weights::Half] {
-        let enable = if weights == Weights::Half { "enable f16;\n" } else { "" };
+    for weights in [WeightPrecision::Single, WeightPrecision::Half] {
+        let enable = if weights == WeightPrecision::Half { "enable f16;\n" } else { "" };
         let bindings = shader::field_bindings(0, 3, weights);
         let text = format!("{enable}{bindings}{}{tracer}", shader::field(sizes));
         let module = validate("pasted", &text, &[]);
@@ -153,7 +153,7 @@ fn the_lights_functions_paste_alone_and_beside_the_field() {
     let (_, uniform) =
         module.global_variables.iter().find(|(_, v)| v.name.as_deref() == Some("veni_light")).unwrap();
     assert_eq!(layouter[uniform.ty].size as usize, shader::LightUniform::BYTES);
-    let field = format!("{}{}", shader::field_bindings(0, 0, Weights::Single), shader::field(PAPER));
+    let field = format!("{}{}", shader::field_bindings(0, 0, WeightPrecision::Single), shader::field(PAPER));
     let both = SAMPLES.replace("s.radiance +", "s.radiance + veni_radiance(s.direction) +");
     assert_eq!(validate("both", &format!("{field}{light}{both}"), &[]).global_variables.len(), 7);
 }
@@ -229,7 +229,7 @@ fn harmonics_and_levels_are_valid() {
     let module = validate("spectrum", shader::spectrum_source(), &[]);
     let names: Vec<_> = module.entry_points.iter().map(|e| e.name.as_str()).collect();
     assert_eq!(names, shader::SPECTRUM_ENTRY_POINTS);
-    for format in [TexelFormat::Rgba32Float, TexelFormat::Rgba16Float] {
+    for format in [StorageFormat::Rgba32Float, StorageFormat::Rgba16Float] {
         let module = validate("level", &shader::level_source(format), &[]);
         assert_eq!(module.entry_points[0].name, shader::LEVEL_ENTRY_POINT);
         let mut layouter = naga::proc::Layouter::default();

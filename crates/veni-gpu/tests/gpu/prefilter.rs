@@ -1,7 +1,7 @@
 //! Harmonics and prefiltered levels on the GPU against their twin and against `veni_light::light`.
 
 use veni_gpu::shader::twin::{veni_degrees, veni_harmonics};
-use veni_gpu::shader::{SpectrumTables, TexelFormat, level_source, spectrum_source};
+use veni_gpu::shader::{SpectrumTables, StorageFormat, level_source, spectrum_source};
 use veni_gpu::wgpu::{self, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages};
 use veni_gpu::{Bake, GpuDecoder, GpuHarmonics, GpuPrefilter, PrefilteredCube, read_back};
 use veni_light::latent::Latent;
@@ -287,7 +287,7 @@ fn narrow_lobes_lack_what_is_beyond_the_largest_degree() {
 fn mistakes_are_noticed() {
     let Some(gpu) = plain() else { return };
     let work = crate::prefilter_by_hand::Work::new();
-    let (spectrum, level) = (spectrum_source().to_owned(), level_source(TexelFormat::Rgba32Float));
+    let (spectrum, level) = (spectrum_source().to_owned(), level_source(StorageFormat::Rgba32Float));
     let off = work.off(&gpu, &spectrum, &level);
     assert!(off[0] < 2e-6 && off[1] < 2e-6, "unbroken: {off:?}");
     for (from, to) in [

@@ -2,6 +2,7 @@
 
 use veni_light::light::CompactLight;
 use veni_light::sphere::Frame;
+use veni_light::vector::{cross, unit};
 
 use crate::luminance;
 
@@ -57,13 +58,4 @@ pub(super) fn triple(v: [f32; 3]) -> String {
 /// Three numbers with spaces.
 pub(super) fn spaced(v: [f32; 3]) -> String {
     format!("{} {} {}", v[0], v[1], v[2])
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn unit(v: [f32; 3]) -> [f32; 3] {
-    let length = v.iter().map(|x| x * x).sum::<f32>().sqrt();
-    v.map(|x| x / length)
 }

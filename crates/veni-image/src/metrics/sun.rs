@@ -2,6 +2,7 @@
 
 use crate::exposure::log_luminance;
 use veni_light::sphere::Equirect;
+use veni_light::vector::{angle, dot, length, scaled};
 
 /// A sun is seen where the largest luminance is e⁶ = 400 times the geometric mean over the sphere, or more. Few panoramas are near
 /// that: among photographs at 128 × 64 the lower quartile is e⁴, the median e⁸.
@@ -25,9 +26,7 @@ pub fn sun_error(grid: Equirect, prediction: &[f32], target: &[f32]) -> Option<f
     let largest = target.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     (largest - mean / total >= VISIBLE).then(|| {
         let (a, b) = (brightest(grid, &log_luminances(grid, prediction)), brightest(grid, &target));
-        // exact for small angles too, where the cosine is flat
-        let across = cross(a, b);
-        f64::from(dot(across, across).sqrt().atan2(dot(a, b)).to_degrees())
+        f64::from(angle(a, b).to_degrees())
     })
 }
 
@@ -45,16 +44,7 @@ fn brightest(grid: Equirect, log_luminances: &[f64]) -> [f32; 3] {
             sum.iter_mut().zip(direction).for_each(|(sum, d)| *sum += weight as f32 * d);
         }
     }
-    let scale = 1.0 / dot(sum, sum).sqrt();
-    sum.map(|v| v * scale)
-}
-
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross([ax, ay, az]: [f32; 3], [bx, by, bz]: [f32; 3]) -> [f32; 3] {
-    [ay * bz - by * az, az * bx - bz * ax, ax * by - bx * ay]
+    scaled(sum, 1.0 / length(sum))
 }
 
 fn log_luminances(grid: Equirect, image: &[f32]) -> Vec<f64> {

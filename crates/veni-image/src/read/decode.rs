@@ -14,7 +14,9 @@ use super::gain_map::{self, Found, GainMap};
 use super::gpano::{Crop, Sphere};
 use super::meaning::{Curve, Meaning};
 use super::xmp::{self, Namespace};
-use super::{LdrPanorama, ReadOptions, Transfer, exif, first_bytes, jpeg, open, png, precheck, unknown};
+use super::{
+    LdrPanorama, ReadOptions, TransferFunction, exif, first_bytes, jpeg, open, png, precheck, unknown,
+};
 use crate::panorama::Panorama;
 use crate::{Error, Result};
 use veni_light::sphere::Equirect;
@@ -46,7 +48,7 @@ impl Decoded {
 
     /// Radiance, in its full sphere, of a file that [is high](Decoded::is_high).
     pub(super) fn radiance(self) -> Panorama {
-        let mut panorama = self.panorama.linear_as_stored(Transfer::Srgb);
+        let mut panorama = self.panorama.linear_as_stored(TransferFunction::Srgb);
         if let Some(map) = &self.gain_map {
             map.apply(panorama.grid.width, panorama.pixels_mut());
             panorama

@@ -20,7 +20,7 @@ pub struct LdrPanorama {
 
 /// How display values become linear ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Transfer {
+pub enum TransferFunction {
     /// As the file says; where it says nothing, by the sRGB curve (IEC 61966-2-1). The default.
     #[default]
     Srgb,
@@ -28,7 +28,7 @@ pub enum Transfer {
     Gamma(f32),
 }
 
-impl Transfer {
+impl TransferFunction {
     /// One display value in [0, 1] to a linear one in [0, 1].
     pub fn linear(self, value: f32) -> f32 {
         match self {
@@ -104,18 +104,18 @@ impl LdrPanorama {
     }
 
     /// Plain linearisation, as the file says: white is radiance 1, and so is everything that was brighter.
-    pub fn linear(&self, transfer: Transfer) -> Panorama {
+    pub fn linear(&self, transfer: TransferFunction) -> Panorama {
         let mut panorama = self.linear_as_stored(transfer);
         self.to_rec709(&mut panorama);
         panorama
     }
 
     /// [`LdrPanorama::linear`] in the primaries of the file, in which each channel was clipped for itself.
-    pub fn linear_as_stored(&self, transfer: Transfer) -> Panorama {
+    pub fn linear_as_stored(&self, transfer: TransferFunction) -> Panorama {
         let mut panorama = Panorama::new(self.grid, self.values.clone());
         let curve = match transfer {
-            Transfer::Srgb => &self.meaning.curve,
-            Transfer::Gamma(gamma) => &Curve::Power(gamma),
+            TransferFunction::Srgb => &self.meaning.curve,
+            TransferFunction::Gamma(gamma) => &Curve::Power(gamma),
         };
         self.meaning.linearise(curve, panorama.pixels_mut());
         panorama.known.clone_from(&self.known);

@@ -3,7 +3,7 @@
 use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, LumaA, Rgb, Rgba};
 
 use super::*;
-use crate::Transfer;
+use crate::TransferFunction;
 
 const SIZE: (u32, u32) = (8, 4);
 
@@ -51,7 +51,7 @@ fn sample_layouts_of_png_jpeg_and_webp() {
     // radiance only where the file holds it
     let error = Panorama::read(&path).unwrap_err().to_string();
     assert!(error.contains("WebP") && error.contains("expand"), "{error}");
-    assert!((Transfer::Srgb.linear(0.5) - 0.214_041).abs() < 1e-5);
+    assert!((TransferFunction::Srgb.linear(0.5) - 0.214_041).abs() < 1e-5);
 }
 
 /// A JPEG with an EXIF block that says how it was held.

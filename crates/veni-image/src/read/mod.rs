@@ -35,7 +35,7 @@ use crate::{Error, Result};
 use veni_light::sphere::Equirect;
 
 pub use content::Content;
-pub use ldr::{LdrPanorama, Transfer};
+pub use ldr::{LdrPanorama, TransferFunction};
 pub use metadata::{METADATA, Metadata, Treatment};
 
 pub use crate::limits::DEFAULT_MAX_PIXELS;

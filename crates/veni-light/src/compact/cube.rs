@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::{CompactLight, Glow};
 use crate::sphere::{CubeFace, Frame};
+use crate::vector::{dot, sub};
 
 /// Places along a side of a texel that the disc's edge crosses; more where the disc is smaller than a texel.
 const PLACES: f64 = 16.0;
@@ -114,10 +115,8 @@ fn near(
     }
     let face = move |face: CubeFace| {
         let depth = face.lookup(0.0, 0.0);
-        let [columns, rows] = [face.lookup(1.0, 0.0), face.lookup(0.0, 1.0)].map(|place| {
-            let along = |axis: [f64; 3]| axis.iter().zip(lookup).map(|(a, b)| a * b).sum::<f64>();
-            places([along(depth), along([0, 1, 2].map(|k| place[k] - depth[k]))], angle, size)
-        });
+        let [columns, rows] = [face.lookup(1.0, 0.0), face.lookup(0.0, 1.0)]
+            .map(|place| places([dot(depth, lookup), dot(sub(place, depth), lookup)], angle, size));
         rows.flat_map(move |row| columns.clone().map(move |column| (face, row, column)))
     };
     CubeFace::ALL.into_iter().flat_map(face)

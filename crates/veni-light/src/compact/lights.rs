@@ -5,6 +5,7 @@ use std::ops::{Deref, Range};
 use super::{CompactLight, Disc, Glow, RadiusSource};
 use crate::limits::MAX_LIGHTS;
 use crate::sphere::{Equirect, Frame};
+use crate::vector::{dot, normalised};
 use crate::{Error, Result};
 
 /// Lights further apart than this, radians, are not the same light of two scenes: 45°.
@@ -167,7 +168,7 @@ impl Lights {
             ));
         }
         for (at, light) in self.all.iter().enumerate() {
-            let square: f32 = light.direction.iter().map(|c| c * c).sum();
+            let square = dot(light.direction, light.direction);
             let unit = (square - 1.0).abs() < 1e-3;
             let wrong = if !unit {
                 format!("direction {:?} is not of length 1", light.direction)
@@ -211,13 +212,11 @@ fn moved(a: &CompactLight, b: &CompactLight, t: f32) -> CompactLight {
     let angle = angle(a.direction, b.direction);
     let weights = if angle > 1e-4 { [((1.0 - t) * angle).sin(), (t * angle).sin()] } else { [1.0 - t, t] };
     let sum = [0, 1, 2].map(|c| weights[0] * a.direction[c] + weights[1] * b.direction[c]);
-    let length = sum.iter().map(|c| c * c).sum::<f32>().sqrt();
     // exact ends; opposite directions have no way between them
     let direction = match t {
         0.0 => a.direction,
         1.0 => b.direction,
-        _ if length > 0.0 => sum.map(|c| c / length),
-        _ => a.direction,
+        _ => normalised(sum).unwrap_or(a.direction),
     };
     let both = a.radius_source == b.radius_source;
     CompactLight {

@@ -11,6 +11,7 @@ pub(crate) use glow::Glow;
 pub use lights::Lights;
 pub use profile::{Falloff, Profile};
 
+use crate::vector::{cross, dot, unit};
 use std::fmt;
 
 /// A light of small solid angle: the sun, the moon, a lamp, a bright window.
@@ -176,7 +177,7 @@ impl CompactLight {
     /// Irradiance of a surface with this unit normal, the part of the disc below its horizon left out: E⊥ times the mean of
     /// max(0, n·d) over the disc.
     pub fn irradiance_on(&self, normal: [f32; 3]) -> [f32; 3] {
-        let cosine: f32 = self.direction.iter().zip(normal).map(|(a, b)| a * b).sum();
+        let cosine = dot(self.direction, normal);
         let mean = if cosine.abs() > self.radius.sin() || self.radius < Self::SMALL {
             // all or nothing of it is above: the mean of the cosine over a disc is cos² (r/2) that of its middle
             let half = (0.5 * self.radius).cos();
@@ -191,10 +192,9 @@ impl CompactLight {
     fn cut(&self, normal: [f32; 3]) -> f32 {
         let [x, y, z] = self.direction;
         let across = if z.abs() < 0.9 { [-y, x, 0.0] } else { [0.0, -z, y] };
-        let length = across.iter().map(|c| c * c).sum::<f32>().sqrt();
-        let u = across.map(|c| c / length);
-        let v = [y * u[2] - z * u[1], z * u[0] - x * u[2], x * u[1] - y * u[0]];
-        let [d, a, b] = [self.direction, u, v].map(|w| w.iter().zip(normal).map(|(w, n)| w * n).sum::<f32>());
+        let u = unit(across);
+        let v = cross(self.direction, u);
+        let [d, a, b] = [self.direction, u, v].map(|w| dot(w, normal));
         let points = (0..Self::POINTS).map(|k| {
             let cos = 1.0 - (1.0 - self.radius.cos()) * (k as f32 + 0.5) / Self::POINTS as f32;
             // the golden angle

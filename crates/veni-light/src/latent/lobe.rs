@@ -1,6 +1,7 @@
 //! A spherical Gaussian of log radiance: detail where the vectors of a code do not reach. MODEL (71).
 
 use crate::limits::MAX_LOBES;
+use crate::vector::{dot, narrow, unit};
 use crate::{Error, Result};
 
 /// Adds a e^{s(⟨d,u⟩ − 1)} to log radiance: amplitude a in the direction u, 1/e of it where 1 − cos of the angle is 1/s.
@@ -21,7 +22,7 @@ impl Lobe {
 
     /// What it adds to log radiance in a unit direction.
     pub fn value(&self, direction: [f32; 3]) -> [f32; 3] {
-        let cosine: f32 = self.direction.iter().zip(direction).map(|(a, b)| a * b).sum();
+        let cosine = dot(self.direction, direction);
         let gauss = (self.sharpness * (cosine - 1.0)).exp();
         self.amplitude.map(|a| a * gauss)
     }
@@ -40,7 +41,7 @@ impl Lobe {
         let [x, y, z] = self.direction.map(f64::from);
         let radius = x.hypot(y);
         let [c, s] = if radius > 1e-6 { [x / radius, y / radius] } else { [0.0, -1.0] };
-        [[-s, c, 0.0], [-z * c, -z * s, radius]].map(|v| normalised(v).map(|c| c as f32))
+        [[-s, c, 0.0], [-z * c, -z * s, radius]].map(|v| narrow(unit(v)))
     }
 
     /// The lobe after a small change of its [coordinates](Lobe::COORDINATES); the middle stays on the sphere.
@@ -53,7 +54,7 @@ impl Lobe {
         self.sharpness = (f64::from(self.sharpness) * by[3].exp()) as f32;
         let along =
             |k: usize| f64::from(self.direction[k]) + by[4] * f64::from(p[k]) + by[5] * f64::from(q[k]);
-        self.direction = normalised([0, 1, 2].map(along)).map(|c| c as f32);
+        self.direction = narrow(unit([0, 1, 2].map(along)));
         self
     }
 
@@ -82,9 +83,9 @@ impl Lobe {
             ));
         }
         for (at, lobe) in lobes.iter().enumerate() {
-            let square: f32 = lobe.direction.iter().map(|c| c * c).sum();
-            let unit = (square - 1.0).abs() < 1e-3;
-            let wrong = if !unit {
+            let square = dot(lobe.direction, lobe.direction);
+            let is_unit = (square - 1.0).abs() < 1e-3;
+            let wrong = if !is_unit {
                 format!("direction {:?} is not of length 1", lobe.direction)
             } else if !lobe.amplitude.iter().all(|a| a.is_finite()) {
                 format!("amplitude {:?} is not finite", lobe.amplitude)
@@ -97,9 +98,4 @@ impl Lobe {
         }
         Ok(())
     }
-}
-
-fn normalised(v: [f64; 3]) -> [f64; 3] {
-    let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
-    v.map(|c| c / length)
 }

@@ -9,6 +9,7 @@ use std::f32::consts::PI;
 use crate::compact::{CompactLight, Lights, RadiusSource};
 use crate::field::Field;
 use crate::sphere::Equirect;
+use crate::vector::dot;
 use crate::{Error, Result};
 
 /// What a surface or a lobe of the sun's size needs to know of a panorama: a few compact lights, the sun first, and
@@ -128,7 +129,7 @@ impl LightOptions {
             )));
         }
         if let SunChoice::Towards(d) = self.sun {
-            let square: f32 = d.iter().map(|c| c * c).sum();
+            let square = dot(d, d);
             if !(square > 0.0 && square.is_finite()) {
                 return Err(Error::invalid(format!("{d:?} is not a direction towards the sun")));
             }
@@ -268,8 +269,7 @@ impl Light {
         let rotated = [cos * x + sin * y, cos * y - sin * x, z];
         let mut sum = [0.0; 3];
         for cell in self.coarse.kept().all() {
-            let cosine: f64 = cell.direction.iter().zip(rotated).map(|(d, n)| d * n).sum();
-            let weight = cell.solid_angle * cosine.max(0.0);
+            let weight = cell.solid_angle * dot(cell.direction, rotated).max(0.0);
             sum = [0, 1, 2].map(|c| sum[c] + weight * f64::from(cell.radiance[c]));
         }
         for light in self.lights.iter() {

@@ -27,7 +27,6 @@ mod sampler;
 pub mod sh;
 #[cfg(feature = "prefilter")]
 mod spectrum;
-mod vector;
 
 pub use crate::compact::{CompactLight, Disc, Falloff, Kind, Lights, Profile, RadiusSource};
 pub use crate::luminance::{LUMINANCE, luminance};

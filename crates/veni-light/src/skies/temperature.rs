@@ -1,5 +1,7 @@
 //! Correlated colour temperature. MODEL (76).
 
+use crate::vector::dot;
+
 /// Linear Rec. 709 (D65) to CIE 1931 X, Y, Z (IEC 61966-2-1).
 const XYZ: [[f64; 3]; 3] =
     [[0.4123908, 0.3575843, 0.1804808], [0.2126390, 0.7151687, 0.0721923], [0.0193308, 0.1191948, 0.9505322]];
@@ -25,7 +27,7 @@ const STEEPEST: f64 = 1.2;
 
 /// Chromaticity x, y (CIE 1931) of a colour in linear Rec. 709; None of what is dark.
 pub fn chromaticity(rgb: [f64; 3]) -> Option<[f64; 2]> {
-    let [x, y, z] = XYZ.map(|row| row.iter().zip(rgb).map(|(m, v)| m * v).sum::<f64>());
+    let [x, y, z] = XYZ.map(|row| dot(row, rgb));
     let sum = x + y + z;
     (sum > 0.0 && sum.is_finite()).then(|| [x / sum, y / sum])
 }

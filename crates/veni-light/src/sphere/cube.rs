@@ -8,6 +8,7 @@
 //! | vector | (1, −b, −a) | (−1, −b, a) | (a, 1, b) | (a, −1, −b) | (a, −b, 1) | (−a, −b, −1) |
 
 use super::Frame;
+use crate::vector::unit;
 
 /// One face of a cube map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -65,8 +66,7 @@ impl CubeFace {
         if frame == Frame::Bevy {
             v[2] = -v[2];
         }
-        let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
-        frame.permuted(v.map(|c| c / length))
+        frame.permuted(unit(v))
     }
 
     /// All unit native directions of a face, row-major; see [`CubeFace::direction`].

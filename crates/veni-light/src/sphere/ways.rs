@@ -1,15 +1,10 @@
 //! A few directions that stand for all.
 
+use crate::vector::unit;
+
 /// The 26 unit vectors from the middle of a cube of 3 × 3 × 3 to the others: normals of surfaces on which light is compared.
 pub fn ways() -> Vec<[f32; 3]> {
-    (0..27)
-        .filter(|k| *k != 13)
-        .map(|k| {
-            let v = [k / 9, k / 3 % 3, k % 3].map(|c| c as f32 - 1.0);
-            let length = v.iter().map(|c| c * c).sum::<f32>().sqrt();
-            v.map(|c| c / length)
-        })
-        .collect()
+    (0..27).filter(|k| *k != 13).map(|k| unit([k / 9, k / 3 % 3, k % 3].map(|c| c as f32 - 1.0))).collect()
 }
 
 #[cfg(test)]

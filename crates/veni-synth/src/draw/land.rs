@@ -2,14 +2,14 @@
 
 use crate::random::Draw;
 use crate::scene::{Ridge, RidgeKind, Setting};
-use crate::surface::{Ground, Pattern, Surface};
+use crate::surface::{Ground, GroundMaterial, Pattern};
 
 /// Surfaces by weight.
-type Choices<'a> = &'a [(f32, Surface)];
+type Choices<'a> = &'a [(f32, GroundMaterial)];
 
 /// The ground of a setting.
 pub(super) fn ground(draw: &mut Draw, setting: Setting) -> Ground {
-    use Surface::{Asphalt, DryGrass, Grass, Leaves, Paving, Rock, Sand, Snow, Soil, Water};
+    use GroundMaterial::{Asphalt, DryGrass, Grass, Leaves, Paving, Rock, Sand, Snow, Soil, Water};
     let snow = draw.chance(0.06);
     let country = [(4.0, Grass), (2.5, DryGrass), (1.5, Soil), (0.8, Sand), (0.7, Rock), (0.3, Asphalt)];
     let (first, second): (Choices<'_>, Choices<'_>) = match setting {
@@ -73,7 +73,7 @@ pub(super) fn ground(draw: &mut Draw, setting: Setting) -> Ground {
 
 /// What closes the horizon of a setting.
 pub(super) fn ridges(draw: &mut Draw, setting: Setting, ground: &Ground) -> Vec<Ridge> {
-    let snowy = ground.surface == Surface::Snow;
+    let snowy = ground.surface == GroundMaterial::Snow;
     let mut out = Vec::new();
     let [hills, mountains, trees, town] = match setting {
         Setting::PureSky => [0.0; 4],
@@ -88,8 +88,13 @@ pub(super) fn ridges(draw: &mut Draw, setting: Setting, ground: &Ground) -> Vec<
         Setting::Rocks => [0.6, 0.5, 0.2, 0.0],
         Setting::Shelter => [0.3, 0.1, 0.7, 0.4],
     };
-    let wild = [(3.0, Surface::Grass), (1.5, Surface::DryGrass), (1.0, Surface::Rock), (1.0, Surface::Soil)];
-    let cover = if snowy { Surface::Snow } else { draw.weighted(&wild) };
+    let wild = [
+        (3.0, GroundMaterial::Grass),
+        (1.5, GroundMaterial::DryGrass),
+        (1.0, GroundMaterial::Rock),
+        (1.0, GroundMaterial::Soil),
+    ];
+    let cover = if snowy { GroundMaterial::Snow } else { draw.weighted(&wild) };
     let count = if setting == Setting::Hills { 3 } else { 2 };
     for _ in 0..count {
         let distance = draw.log_range(350.0, 9000.0);
@@ -130,7 +135,7 @@ pub(super) fn ridges(draw: &mut Draw, setting: Setting, ground: &Ground) -> Vec<
         distance,
         height: draw.range(6.0, 17.0) + if setting == Setting::Forest { 6.0 } else { 0.0 },
         relief: draw.range(0.35, 0.95) * if setting == Setting::Forest { 0.4 } else { 1.0 },
-        surface: Surface::Grass,
+        surface: GroundMaterial::Grass,
         gaps: open,
         snow_line: 1e5,
         seed: draw.bits(),
@@ -145,7 +150,7 @@ pub(super) fn ridges(draw: &mut Draw, setting: Setting, ground: &Ground) -> Vec<
         distance,
         height: draw.log_range(8.0, 32.0),
         relief: draw.range(0.3, 0.7),
-        surface: Surface::Paving,
+        surface: GroundMaterial::Paving,
         gaps: open,
         snow_line: 1e5,
         seed: draw.bits(),

@@ -1,7 +1,7 @@
 //! The linear functions of the expansion, by least squares.
 
 use veni_core::expand::{Analysis, FEATURES, Region};
-use veni_core::panorama::{Transfer, luminance};
+use veni_core::panorama::{TransferFunction, luminance};
 use veni_light::cholesky;
 
 use crate::Failure;
@@ -15,7 +15,7 @@ pub(crate) fn run(folder: &str) -> Result<(), Failure> {
     let (mut exponent, mut sun) = (System::<FEATURES>::default(), System::<FEATURES>::default());
     let (mut red, mut blue) = (System::<2>::default(), System::<2>::default());
     for sample in Sample::all(&panoramas) {
-        let analysis = Analysis::new(&sample.ldr, Transfer::Srgb);
+        let analysis = Analysis::new(&sample.ldr, TransferFunction::Srgb);
         let (grid, truth) = (sample.truth.grid(), sample.truth.pixels());
         let weight = |pixel: usize| grid.solid_angle(pixel / grid.width);
         let total: f64 = analysis.regions().iter().map(|r| r.solid_angle).sum();

@@ -2,7 +2,7 @@
 
 use veni_core::expand::Expand;
 use veni_core::expand::{Analysis, ExpandOptions};
-use veni_core::panorama::{Panorama, Transfer, luminance};
+use veni_core::panorama::{Panorama, TransferFunction, luminance};
 
 use crate::Failure;
 use crate::operators::{banterle, landis};
@@ -62,19 +62,19 @@ impl Method {
 
     fn landis(brightest: f32) -> Self {
         Self::new(format!("Landis 2002, brightest {brightest}"), move |s| {
-            landis(&s.ldr.linear(Transfer::Srgb), brightest)
+            landis(&s.ldr.linear(TransferFunction::Srgb), brightest)
         })
     }
 
     fn banterle(white: f32) -> Self {
         Self::new(format!("Banterle 2006, white {white}"), move |s| {
-            banterle(&Analysis::new(&s.ldr, Transfer::Srgb), white)
+            banterle(&Analysis::new(&s.ldr, TransferFunction::Srgb), white)
         })
     }
 }
 
 pub(crate) fn run(folder: &str, train: Option<&str>) -> Result<(), Failure> {
-    let mut methods = vec![Method::new("linearised", |s| s.ldr.linear(Transfer::Srgb))];
+    let mut methods = vec![Method::new("linearised", |s| s.ldr.linear(TransferFunction::Srgb))];
     if let Some(train) = train {
         let train = read(train)?;
         let whites = [1.5, 2.0, 3.0, 4.0, 8.0, 16.0];

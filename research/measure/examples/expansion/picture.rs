@@ -5,7 +5,7 @@ use std::path::Path;
 use veni_core::expand::Expand;
 use veni_core::expand::ExpandOptions;
 use veni_core::panorama::tonemap::srgb;
-use veni_core::panorama::{Panorama, Transfer};
+use veni_core::panorama::{Panorama, TransferFunction};
 use veni_core::sphere::Equirect;
 use veni_image::Sheet;
 use veni_light::output::Overwrite;
@@ -23,7 +23,7 @@ pub(crate) fn run(out: &str, inputs: &[&str]) -> Result<(), Failure> {
     for (row, input) in inputs.iter().enumerate() {
         let (name, panorama) = read_file(Path::new(input))?;
         let sample = Sample::new(&panorama, 0.0);
-        let linear = sample.ldr.linear(Transfer::Srgb);
+        let linear = sample.ldr.linear(TransferFunction::Srgb);
         let expanded = sample.ldr.expand(&ExpandOptions::default());
         eprintln!("{name}: {:.1} % clipped, {:?}", 100.0 * expanded.clipped, expanded.sun);
         let cells: [(&Panorama, f32); 4] =

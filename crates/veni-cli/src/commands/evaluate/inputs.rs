@@ -8,8 +8,8 @@ use clap::ValueEnum;
 use veni_core::LoadedModel;
 use veni_core::train::config::DeviceKind;
 use veni_data::{Fold, panorama_files};
-use veni_eval::baseline::Kind;
-use veni_eval::codec::Basis;
+use veni_eval::baseline::BaselineKind;
+use veni_eval::codec::FittedBasis;
 use veni_light::Error;
 use veni_light::output::{Overwrite, below, existing_above, write_atomic};
 use veni_light::progress::Observer;
@@ -75,7 +75,11 @@ pub(super) fn subjects(
 }
 
 /// The bases asked for, of each size that a model has.
-pub(super) fn bases(names: &[BaselineName], subjects: &[LoadedModel], quick: bool) -> Result<Vec<Basis>> {
+pub(super) fn bases(
+    names: &[BaselineName],
+    subjects: &[LoadedModel],
+    quick: bool,
+) -> Result<Vec<FittedBasis>> {
     // with one light where there are lobes, as the sizes of codes inside the program are counted
     let size = |subject: &LoadedModel| match subject.lobes() {
         0 => subject.dimension(),
@@ -88,12 +92,12 @@ pub(super) fn bases(names: &[BaselineName], subjects: &[LoadedModel], quick: boo
     for name in names {
         let kind = match name {
             BaselineName::None => continue,
-            BaselineName::Sh => Kind::SphericalHarmonics,
-            BaselineName::Sg => Kind::SphericalGaussians,
-            BaselineName::Mixture => Kind::GaussianMixture,
+            BaselineName::Sh => BaselineKind::SphericalHarmonics,
+            BaselineName::Sg => BaselineKind::SphericalGaussians,
+            BaselineName::Mixture => BaselineKind::GaussianMixture,
         };
         for size in &sizes {
-            bases.push(Basis::new(kind, *size, quick)?);
+            bases.push(FittedBasis::new(kind, *size, quick)?);
         }
     }
     Ok(bases)

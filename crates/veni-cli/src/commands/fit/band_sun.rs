@@ -3,6 +3,7 @@
 use veni_fit::Best;
 use veni_light::light::sh::Basis;
 use veni_light::light::{CompactLight, LUMINANCE, Lights};
+use veni_light::vector::unit;
 
 /// Shares of the strongest sun that are tried: the rest of the first band is the sky's.
 pub(super) const SHARES: [f64; 3] = [0.5, 0.75, 0.9];
@@ -28,8 +29,7 @@ impl BandSun {
             band.map(|v| v * 4.0 * std::f64::consts::PI / 3.0)
         });
         let bright = axes.map(|rgb| rgb.iter().zip(LUMINANCE).map(|(v, w)| v * f64::from(w)).sum::<f64>());
-        let length = bright.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let direction = bright.map(|v| v / length);
+        let direction = unit(bright);
         let most = [0, 1, 2].map(|c| (0..3).map(|k| axes[k][c] * direction[k]).sum::<f64>().max(0.0));
         (direction[2] > 0.0 && most.iter().sum::<f64>() > 0.0).then_some(Self { direction, most })
     }

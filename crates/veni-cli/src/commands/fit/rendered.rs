@@ -6,8 +6,8 @@ use anyhow::{Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use veni_fit::matching_exposure;
 use veni_fit::shade::{
-    Camera, Colour, ExposureForm, Lights, Material, NormalMap, RenderedImage, RenderingLoss, ShadingForm,
-    Surface, Transfer, read_albedo, read_mask,
+    Camera, Colour, DistantLights, ExposureForm, Material, NormalMap, RenderedImage, RenderingLoss,
+    ShadingForm, Surface, Transfer, read_albedo, read_mask,
 };
 use veni_image::Picture;
 use veni_light::Error;
@@ -113,13 +113,13 @@ impl Rendered {
         let grid = Equirect::new(self.lights, self.lights / 2);
         let (lights, form, loss, exposure) = match self.shading {
             Shading::Physical => (
-                Lights::equirect(grid),
+                DistantLights::equirect(grid),
                 ShadingForm::Physical,
                 RenderingLoss::default(),
                 ExposureForm::Natural,
             ),
             Shading::Reference => (
-                Lights::new(&grid.directions(), &vec![1.0; grid.len()])?,
+                DistantLights::new(&grid.directions(), &vec![1.0; grid.len()])?,
                 ShadingForm::Reference,
                 RenderingLoss::ReferenceLog,
                 ExposureForm::Reference,

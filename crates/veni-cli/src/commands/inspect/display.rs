@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use serde_json::json;
-use veni_image::{Content, LdrPanorama, ReadOptions, Transfer, luminance};
+use veni_image::{Content, LdrPanorama, ReadOptions, TransferFunction, luminance};
 
 use super::facts::Facts;
 use super::image::{radiance, reservations};
@@ -40,7 +40,7 @@ fn display(image: &LdrPanorama) -> Facts {
     let is_clipped = |at: usize| image.values()[at].iter().any(|v| *v >= CLIPPED);
     let clipped = over(&|at| f64::from(u8::from(is_clipped(at))));
     facts.add("clipped", format!("{:.1} % of the pixels", 100.0 * clipped), clipped);
-    let linear = image.linear(Transfer::Srgb);
+    let linear = image.linear(TransferFunction::Srgb);
     let mean = over(&|at| f64::from(luminance(linear.pixels()[at])));
     facts.add("mean luminance", format!("{mean:.4} of white"), mean);
     facts

@@ -6,6 +6,7 @@ use anyhow::Result;
 use serde_json::{Value, json};
 use veni_light::latent::Latent;
 use veni_light::light::CompactLight;
+use veni_light::vector::length;
 
 use super::facts::Facts;
 use crate::latent_files::in_words;
@@ -15,8 +16,7 @@ pub(super) fn describe(path: &Path) -> Result<Facts> {
     let mut facts = Facts::new("latent");
     let n = latent.vectors.len();
     facts.add("vectors", format!("{n} (D = {})", latent.dimension()), n);
-    let lengths: Vec<f32> =
-        latent.vectors.iter().map(|v| v.iter().map(|c| c * c).sum::<f32>().sqrt()).collect();
+    let lengths: Vec<f32> = latent.vectors.iter().map(|v| length(*v)).collect();
     let shown: Vec<_> = lengths.iter().take(12).map(|l| format!("{l:.2}")).collect();
     let more = if n > 12 { format!(" … ({} more)", n - 12) } else { String::new() };
     facts.add("lengths", shown.join(" ") + &more, json!(lengths));

@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 
 use veni_image::{Panorama, luminance};
+use veni_light::vector::length;
 
 /// Solid angle that is looked at for the sun, steradians: a cap of 3.2° radius. The disc itself (0.27°) is smaller
 /// than a pixel of most panoramas, its glow is not.
@@ -91,7 +92,7 @@ impl Statistics {
                 sum.iter_mut().zip(direction).for_each(|(s, d)| *s += power * f64::from(d));
             }
         }
-        let length = sum.iter().map(|s| s * s).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+        let length = length(sum).max(f64::MIN_POSITIVE);
         let sun = Sun { direction: sum.map(|s| s / length), share: light / total };
         Self { min, darkest, max, mean: total / sphere, median, sun }
     }

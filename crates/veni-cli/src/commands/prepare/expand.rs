@@ -6,9 +6,11 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use veni_data::expand::ExpandOptions;
-use veni_data::expand::network::{Network, NetworkInput, NetworkOptions, NetworkOutput, NetworkScale};
+use veni_data::expand::network::{
+    ExpansionNetwork, NetworkInput, NetworkOptions, NetworkOutput, NetworkScale,
+};
 use veni_data::prepare::Expander;
-use veni_image::Transfer;
+use veni_image::TransferFunction;
 use veni_light::digest::Digest;
 use veni_light::sphere::Equirect;
 
@@ -92,7 +94,7 @@ enum Scale {
 impl Expand {
     /// What expands, and what is remembered of the network that does.
     pub(super) fn expander(&self) -> Result<(Option<Expander>, Option<NetworkSettings>)> {
-        let transfer = self.gamma.map_or(Transfer::Srgb, Transfer::Gamma);
+        let transfer = self.gamma.map_or(TransferFunction::Srgb, TransferFunction::Gamma);
         match (self.expand, &self.expand_with) {
             (Mode::Off, Some(model)) => bail!(
                 "--expand off refuses what --expand-with {} would expand: give one of the two",
@@ -136,14 +138,14 @@ impl Expand {
 
 /// The network and its file's digest.
 #[cfg(feature = "onnx")]
-fn load(model: &Path) -> Result<(Arc<dyn Network>, Digest)> {
+fn load(model: &Path) -> Result<(Arc<dyn ExpansionNetwork>, Digest)> {
     let network = veni_data::expand::network::OnnxNetwork::load(model)?;
     let digest = network.digest();
     Ok((Arc::new(network), digest))
 }
 
 #[cfg(not(feature = "onnx"))]
-fn load(model: &Path) -> Result<(Arc<dyn Network>, Digest)> {
+fn load(model: &Path) -> Result<(Arc<dyn ExpansionNetwork>, Digest)> {
     bail!(
         "--expand-with {}: this veni-cli was built without an ONNX runtime; build it with --features onnx",
         model.display()

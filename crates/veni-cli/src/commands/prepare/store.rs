@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use veni_data::prepare::Expander;
-use veni_image::Transfer;
+use veni_image::TransferFunction;
 use veni_light::Error;
 use veni_light::output::{Lock, Overwrite, below, name_new, write_atomic};
 
@@ -74,7 +74,7 @@ impl Settings {
         });
         let expand = match transfer {
             None => "off".to_owned(),
-            Some(Transfer::Gamma(gamma)) => format!("gamma {gamma}"),
+            Some(TransferFunction::Gamma(gamma)) => format!("gamma {gamma}"),
             Some(_) => "srgb".to_owned(),
         };
         Self { format: FORMAT, width, height, expand, network, layer: None }

@@ -13,7 +13,7 @@ mod tests;
 
 use serde::{Deserialize, Serialize};
 
-pub use device::{DecoderBackend, DeviceKind, Devices, Opened};
+pub use device::{DecoderBackend, DeviceKind, Devices, WorkingDevice};
 pub use loss_grid::LossGrid;
 pub use report::{ReportConfig, Stored};
 pub use stage::{Stage, StageConfig};

@@ -3,16 +3,17 @@
 use burn::tensor::{Device, Tensor, TensorData};
 
 use veni_light::sphere::{Equirect, ways};
+use veni_light::vector::dot;
 
 /// What turns radiance into irradiance on surfaces that face the [`ways`], `[26, H·W]`: solid angle times cosine.
 pub fn surfaces(height: usize, width: usize, device: &Device) -> Tensor<2> {
     let grid = Equirect::new(width, height);
     let directions = grid.directions();
     let weight = |way: [f32; 3]| {
-        directions.iter().enumerate().map(move |(index, d)| {
-            let cosine: f32 = d.iter().zip(way).map(|(a, b)| a * b).sum();
-            cosine.max(0.0) * grid.solid_angle(index / width) as f32
-        })
+        directions
+            .iter()
+            .enumerate()
+            .map(move |(index, d)| dot(*d, way).max(0.0) * grid.solid_angle(index / width) as f32)
     };
     let weights: Vec<f32> = ways().into_iter().flat_map(weight).collect();
     Tensor::from_data(TensorData::new(weights, [ways().len(), grid.len()]), device)

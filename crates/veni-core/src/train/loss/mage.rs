@@ -3,7 +3,8 @@
 use super::LossForm;
 use super::rows;
 use super::stencil::{
-    Coarsen, Edge, Filter, Grid, LAPLACE, REFERENCE_VERTICAL, SCHARR_HORIZONTAL, SCHARR_VERTICAL, Stencil,
+    Coarsen, Edge, Filter, LAPLACE, REFERENCE_VERTICAL, SCHARR_HORIZONTAL, SCHARR_VERTICAL, Stencil,
+    StencilGrid,
 };
 use burn::tensor::{Device, Tensor};
 
@@ -41,7 +42,7 @@ impl Mage {
             let factor = 1 << s;
             let coarsen = Coarsen::Average;
             let horizontal_edge = Edge::Periodic;
-            let grid = Grid { size: [height, width], channels: 3, factor, coarsen, horizontal_edge };
+            let grid = StencilGrid { size: [height, width], channels: 3, factor, coarsen, horizontal_edge };
             let filters = [SCHARR_HORIZONTAL, SCHARR_VERTICAL].map(|k| Filter::new(k, grid, device));
             let coarse = coarsen.count(height, factor);
             let inner =
@@ -108,7 +109,7 @@ pub fn reference_planes(
     let stencils = operator.stencils();
     let mut terms = Vec::new();
     for s in 0..scales {
-        let grid = Grid {
+        let grid = StencilGrid {
             size: [height, width],
             channels: 1,
             factor: 1 << s,

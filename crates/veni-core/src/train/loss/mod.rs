@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 
 use burn::tensor::{Device, Tensor, Transaction};
 use mage::MageForm;
-use mse::Space;
+use mse::LossSpace;
 use veni_fit::schedule::WeightSchedule;
 
 pub use veni_fit::loss::{LossConfig, LossForm};
@@ -139,7 +139,7 @@ impl Loss {
     pub fn image_terms(&self, step: u64, prediction: Tensor<4>, target: Tensor<4>) -> LossTerms {
         let (config, form) = (&self.config, self.config.form);
         let images = || (prediction.clone(), target.clone(), self.rows.clone());
-        let error = |space: Space| {
+        let error = |space: LossSpace| {
             let (p, i, rows) = images();
             mse::mse(form, space, p, i, rows, None)
         };
@@ -173,9 +173,9 @@ impl Loss {
                 LossForm::Reference => cosine::reference(p, i, rows),
             }
         });
-        put("log_mse", &config.log_mse, &|| error(Space::Log));
-        put("hdr_mse", &config.hdr_mse, &|| error(Space::Hdr));
-        put("ldr_mse", &config.ldr_mse, &|| error(Space::Ldr));
+        put("log_mse", &config.log_mse, &|| error(LossSpace::Log));
+        put("hdr_mse", &config.hdr_mse, &|| error(LossSpace::Hdr));
+        put("ldr_mse", &config.ldr_mse, &|| error(LossSpace::Ldr));
         if let Some(surfaces) = &self.surfaces {
             put("irradiance", &config.irradiance, &|| {
                 irradiance::irradiance(prediction.clone(), target.clone(), surfaces.clone())

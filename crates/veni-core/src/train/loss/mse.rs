@@ -8,7 +8,7 @@ use veni_image::tonemap::srgb::{GAMMA, KNEE, OFFSET, SCALE, SLOPE};
 /// Where radiance is compared. Inputs are log radiance always.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Space {
+pub enum LossSpace {
     /// Log radiance.
     Log,
     /// Linear radiance.
@@ -24,7 +24,7 @@ pub enum Space {
 /// divided out; and the reference's "LDR" error is computed in log space. `[B, H, W, 3]` → `[1]`.
 pub fn mse(
     form: LossForm,
-    space: Space,
+    space: LossSpace,
     prediction: Tensor<4>,
     target: Tensor<4>,
     rows: Tensor<4>,
@@ -36,9 +36,9 @@ pub fn mse(
         None => rows,
     };
     let (p, i) = match (space, form) {
-        (Space::Log, _) | (Space::Ldr, LossForm::Reference) => (prediction, target),
-        (Space::Hdr, _) => (prediction.exp(), target.exp()),
-        (Space::Ldr, LossForm::Corrected) => {
+        (LossSpace::Log, _) | (LossSpace::Ldr, LossForm::Reference) => (prediction, target),
+        (LossSpace::Hdr, _) => (prediction.exp(), target.exp()),
+        (LossSpace::Ldr, LossForm::Corrected) => {
             let white = white_point(&target);
             (display(prediction, white.clone()), display(target, white))
         }

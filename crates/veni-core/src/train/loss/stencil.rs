@@ -84,7 +84,7 @@ pub struct Filter {
 
 /// An axis pair's size, coarsening and edges.
 #[derive(Clone, Copy, Debug)]
-pub struct Grid {
+pub struct StencilGrid {
     /// Rows and columns of the image.
     pub size: [usize; 2],
     /// Interleaved channels.
@@ -100,7 +100,7 @@ pub struct Grid {
 impl Filter {
     /// # Panics
     /// If an axis has fewer than three elements after coarsening.
-    pub fn new(stencil: Stencil, grid: Grid, device: &Device) -> Self {
+    pub fn new(stencil: Stencil, grid: StencilGrid, device: &Device) -> Self {
         let ([height, width], channels) = (grid.size, grid.channels);
         let term = |&(vertical, horizontal): &([f64; 3], [f64; 3])| {
             let v = axis(height, grid.factor, grid.coarsen, vertical, Edge::Valid);
@@ -173,8 +173,13 @@ mod tests {
         let planes = Tensor::from_data(TensorData::new(data, [1, height, width * channels]), &device);
         for coarsen in [Coarsen::Stride, Coarsen::Average] {
             for edge in [Edge::Valid, Edge::Periodic] {
-                let grid =
-                    Grid { size: [height, width], channels, factor: 2, coarsen, horizontal_edge: edge };
+                let grid = StencilGrid {
+                    size: [height, width],
+                    channels,
+                    factor: 2,
+                    coarsen,
+                    horizontal_edge: edge,
+                };
                 let out = Filter::new(REFERENCE_VERTICAL, grid, &device).apply(planes.clone());
                 let columns = if edge == Edge::Valid { 3 } else { 5 };
                 assert_eq!(out.dims(), [1, 2, columns * channels]);

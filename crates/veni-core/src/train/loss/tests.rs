@@ -180,7 +180,7 @@ fn a_mask_leaves_out_what_it_covers() {
         Tensor::cat(vec![p.clone().narrow(2, 0, W / 2), p.clone().narrow(2, W / 2, W / 2) + 9.0], 2);
     let rows = rows::solid_angle(H, &device);
     let error = |p: Tensor<4>, mask| {
-        number(mse::mse(LossForm::Corrected, Space::Log, p, i.clone(), rows.clone(), mask))
+        number(mse::mse(LossForm::Corrected, LossSpace::Log, p, i.clone(), rows.clone(), mask))
     };
     assert_eq!(error(p.clone(), Some(half.clone())), error(spoiled.clone(), Some(half.clone())));
     assert!(error(spoiled, None) > error(p.clone(), None) + 1.0);

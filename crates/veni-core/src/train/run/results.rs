@@ -72,7 +72,7 @@ impl Trainer {
         };
         if best {
             self.store(&network, 0, step, stop, progress)?;
-            self.best = val.map(|scores| Best { step, ldr_psnr: scores.ldr_psnr });
+            self.best = val.map(|scores| BestValidation { step, ldr_psnr: scores.ldr_psnr });
         }
         let report = ValidationReport { step, val, train, best };
         log.append(&Record { step, validation: &report })?;

@@ -37,7 +37,7 @@ mod wire;
 use std::fmt::Debug;
 
 use crate::{Error, Result};
-use veni_image::{LdrPanorama, Panorama, Transfer, tonemap};
+use veni_image::{LdrPanorama, Panorama, TransferFunction, tonemap};
 use veni_light::sphere::Equirect;
 
 #[cfg(feature = "onnx")]
@@ -51,7 +51,7 @@ pub const KEPT: f32 = 0.95;
 
 /// A network that estimates radiance from an image of limited range. `OnnxNetwork` runs ONNX files (feature `onnx`);
 /// implement this to run something else.
-pub trait Network: Debug + Send + Sync {
+pub trait ExpansionNetwork: Debug + Send + Sync {
     /// What messages call it: a file's name.
     fn name(&self) -> &str;
 
@@ -100,7 +100,7 @@ pub enum NetworkScale {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NetworkOptions {
     /// From display values to linear ones.
-    pub transfer: Transfer,
+    pub transfer: TransferFunction,
     /// What it is given.
     pub input: NetworkInput,
     /// What it gives.
@@ -137,7 +137,7 @@ impl NetworkOptions {
     ///
     /// # Errors
     /// [`Error::Invalid`] if it is made for another size.
-    pub fn check(&self, network: &dyn Network) -> Result<()> {
+    pub fn check(&self, network: &dyn ExpansionNetwork) -> Result<()> {
         let Some(grid) = self.grid else { return Ok(()) };
         let [height, width] = network.size();
         if height.is_some_and(|h| h != grid.height) || width.is_some_and(|w| w != grid.width) {
@@ -155,7 +155,7 @@ impl NetworkOptions {
     }
 
     /// The size at which the network sees a panorama.
-    fn seen(&self, own: Equirect, network: &dyn Network) -> Equirect {
+    fn seen(&self, own: Equirect, network: &dyn ExpansionNetwork) -> Equirect {
         if let Some(grid) = self.grid {
             return grid;
         }
@@ -172,7 +172,7 @@ impl NetworkOptions {
 /// [`Expand::expand_by`](super::Expand::expand_by).
 pub(super) fn expand_by(
     ldr: &LdrPanorama,
-    network: &dyn Network,
+    network: &dyn ExpansionNetwork,
     options: &NetworkOptions,
 ) -> Result<NetworkExpanded> {
     options.check(network)?;
@@ -184,7 +184,7 @@ pub(super) fn expand_by(
     let grid = options.seen(ldr.grid(), network);
     let shown = match (options.input, options.transfer) {
         (NetworkInput::Linear, _) => linear.clone(),
-        (NetworkInput::Srgb, Transfer::Srgb) if ldr.is_srgb() => {
+        (NetworkInput::Srgb, TransferFunction::Srgb) if ldr.is_srgb() => {
             Panorama::new(ldr.grid(), ldr.values().to_vec())
         }
         (NetworkInput::Srgb, _) => {

@@ -9,7 +9,7 @@ use rten::{DataType, Dimension, LoadError, LoadErrorKind, Model, NodeId, Value, 
 use veni_light::digest::Digest;
 
 use super::wire::Fields;
-use super::{Network, graph_check};
+use super::{ExpansionNetwork, graph_check};
 use crate::limits::{MAX_ONNX_BYTES, MAX_ONNX_PIXELS, MAX_ONNX_SECONDS};
 use crate::{Error, Result};
 use veni_light::limits::at_most;
@@ -112,7 +112,7 @@ impl OnnxNetwork {
     }
 }
 
-impl Network for OnnxNetwork {
+impl ExpansionNetwork for OnnxNetwork {
     fn name(&self) -> &str {
         &self.name
     }

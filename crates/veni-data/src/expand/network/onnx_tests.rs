@@ -45,7 +45,7 @@ fn sky() -> LdrPanorama {
 /// The largest |ln| between what came out and `expected(linear values, pixel, channel)` where the image is clipped.
 fn off(done: &NetworkExpanded, expected: impl Fn(&Panorama, usize, usize) -> f32) -> f32 {
     let (ldr, mut off, mut count) = (sky(), 0f32, 0);
-    let linear = ldr.linear(Transfer::Srgb);
+    let linear = ldr.linear(TransferFunction::Srgb);
     for (k, values) in ldr.values().iter().enumerate() {
         for (c, v) in values.iter().enumerate() {
             if *v >= CLIPPED {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Network, NetworkOutput};
+use super::{ExpansionNetwork, NetworkOutput};
 use crate::{Error, Result};
 use veni_image::Panorama;
 use veni_light::sphere::Equirect;
@@ -13,7 +13,11 @@ const MARGIN: usize = 64;
 const MULTIPLE: usize = 32;
 
 /// The network's radiance for the values it is shown, at their own size.
-pub(super) fn run(network: &dyn Network, shown: &Panorama, output: NetworkOutput) -> Result<Panorama> {
+pub(super) fn run(
+    network: &dyn ExpansionNetwork,
+    shown: &Panorama,
+    output: NetworkOutput,
+) -> Result<Panorama> {
     let Equirect { width, height } = shown.grid();
     let [fixed_height, fixed_width] = network.size();
     let (top, rows) = extent(height, fixed_height.is_some());

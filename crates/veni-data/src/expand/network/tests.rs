@@ -12,7 +12,7 @@ type Function = fn(&[f32], [usize; 2]) -> Vec<f32>;
 #[derive(Debug)]
 struct Written(Function, [Option<usize>; 2]);
 
-impl Network for Written {
+impl ExpansionNetwork for Written {
     fn name(&self) -> &str {
         "written.onnx"
     }
@@ -69,10 +69,10 @@ fn clipped_values_are_the_networks_and_others_are_kept() {
     let ldr = sky(0.9);
     let network = Written(times_four, FREE);
     for (input, transfer) in [
-        (NetworkInput::Linear, Transfer::Srgb),
-        (NetworkInput::Srgb, Transfer::Srgb),
-        (NetworkInput::Linear, Transfer::Gamma(2.0)),
-        (NetworkInput::Srgb, Transfer::Gamma(2.0)),
+        (NetworkInput::Linear, TransferFunction::Srgb),
+        (NetworkInput::Srgb, TransferFunction::Srgb),
+        (NetworkInput::Linear, TransferFunction::Gamma(2.0)),
+        (NetworkInput::Srgb, TransferFunction::Gamma(2.0)),
     ] {
         let options = NetworkOptions { transfer, input, ..Default::default() };
         let done = ldr.expand_by(&network, &options).unwrap();
@@ -100,12 +100,15 @@ fn clipped_values_are_the_networks_and_others_are_kept() {
     // as bright as recorded at least, and said how often that was needed
     let dim = Written(|planes, _| planes.iter().map(|v| 0.5 * v).collect(), FREE);
     let done = ldr.expand_by(&dim, &NetworkOptions::default()).unwrap();
-    assert_eq!(done.panorama, ldr.linear(Transfer::Srgb));
+    assert_eq!(done.panorama, ldr.linear(TransferFunction::Srgb));
     assert_eq!(done.estimate.map(|e| e.below), Some(1.0));
     // nothing is near clipping: the network is not even asked
     let panics = Written(|_, _| unreachable!("nothing to estimate"), FREE);
     let done = sky(0.4).expand_by(&panics, &NetworkOptions::default()).unwrap();
-    assert_eq!((done.panorama, done.clipped, done.estimate), (sky(0.4).linear(Transfer::Srgb), 0.0, None));
+    assert_eq!(
+        (done.panorama, done.clipped, done.estimate),
+        (sky(0.4).linear(TransferFunction::Srgb), 0.0, None)
+    );
 }
 
 #[test]
@@ -159,7 +162,7 @@ fn a_convolution_sees_neither_seam_nor_poles() {
     assert!(seam(|ldr| ldr.expand_by(&across, &options).unwrap().panorama) < 1e-6);
     // the same network on the bare image has a seam, and the check sees it
     let bare = |ldr: &LdrPanorama| {
-        let linear = ldr.linear(Transfer::Srgb);
+        let linear = ldr.linear(TransferFunction::Srgb);
         let planes: Vec<f32> = (0..3).flat_map(|c| linear.pixels().iter().map(move |p| p[c])).collect();
         let out = blur(&planes, [GRID.height, GRID.width], false);
         Panorama::new(GRID, (0..GRID.len()).map(|k| [0, 1, 2].map(|c| out[c * GRID.len() + k])).collect())
@@ -168,7 +171,7 @@ fn a_convolution_sees_neither_seam_nor_poles() {
 
     let down = Written(|planes, size| blur(planes, size, true), FREE);
     let ldr = sky(1.2);
-    let linear = ldr.linear(Transfer::Srgb);
+    let linear = ldr.linear(TransferFunction::Srgb);
     let done = ldr.expand_by(&down, &options).unwrap().panorama;
     for column in 0..GRID.width {
         // above the first row is the first row, half a turn away

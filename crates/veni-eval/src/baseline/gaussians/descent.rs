@@ -1,10 +1,11 @@
 //! The search for the lobes: Adam from several starts.
 
-use super::{Gaussians, dot, greedy, shape};
+use super::{Gaussians, greedy, shape};
 use crate::baseline::target::Target;
 use crate::{Error, Result};
 use veni_fit::Adam;
 use veni_light::random::{Purpose, stream};
+use veni_light::vector::length;
 
 /// The widest lobe, about a constant over the sphere.
 const BLUNT: f64 = 0.05;
@@ -96,7 +97,7 @@ impl Search {
             x.iter_mut().zip(adam.step(&gradient, rate)).for_each(|(x, by)| *x += by);
             for v in x[..shape::FREE * problem.lobes()].chunks_exact_mut(shape::FREE) {
                 // only the direction of the vector means something; at length 1 a step is an angle
-                let length = dot([v[0], v[1], v[2]], [v[0], v[1], v[2]]).sqrt();
+                let length = length([v[0], v[1], v[2]]);
                 v[..3].iter_mut().for_each(|c| *c /= length);
                 v[3] = v[3].clamp(BLUNT.ln(), sharpest.ln());
             }

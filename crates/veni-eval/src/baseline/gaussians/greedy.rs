@@ -1,10 +1,11 @@
 //! A start by orthogonal matching pursuit (Pati et al. 1993): lobe after lobe, each the one out of a dictionary that takes
 //! most of what is left.
 
-use super::{dot, shape};
+use super::shape;
 use crate::baseline::least_squares;
 use crate::baseline::target::Target;
 use veni_light::sphere::reference::fibonacci_sphere;
+use veni_light::vector::dot;
 
 /// Pixels looked at, about.
 const PIXELS: usize = 2048;

@@ -2,7 +2,7 @@
 //! sphere and by solid angle.
 
 use super::descent::Problem;
-use super::{Gaussians, Lobe, shape};
+use super::{Gaussians, SphericalGaussian, shape};
 use crate::baseline::target::Target;
 
 /// J = Σ ω |ln(e^b + Σ_g e^{w_g} e^{λ_g(⟨μ_g,d⟩ − 1)}) − t|² / 3. Free numbers: the shapes, then w per lobe, then b.
@@ -83,7 +83,9 @@ impl Problem for Mixture<'_> {
         let amplitudes: Vec<[f64; 3]> = logs.as_chunks::<3>().0.iter().map(|w| w.map(f64::exp)).collect();
         let lobes = shape::lobes(shapes).zip(&amplitudes);
         Gaussians {
-            lobes: lobes.map(|((axis, sharpness), a)| Lobe { axis, sharpness, amplitude: *a }).collect(),
+            lobes: lobes
+                .map(|((axis, sharpness), a)| SphericalGaussian { axis, sharpness, amplitude: *a })
+                .collect(),
             constant: amplitudes[self.lobes],
         }
     }

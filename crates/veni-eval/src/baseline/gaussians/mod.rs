@@ -11,10 +11,11 @@ pub use descent::Search;
 
 use super::target::Target;
 use crate::Result;
+use veni_light::vector::dot;
 
 /// One lobe, a e^{λ(⟨μ,d⟩ − 1)}. It counts as six numbers: two for the axis, one for the sharpness, three for the colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lobe {
+pub struct SphericalGaussian {
     /// μ, unit length.
     pub axis: [f64; 3],
     /// λ > 0; the half width at 1/e of the peak is about √(2/λ) radians.
@@ -27,7 +28,7 @@ pub struct Lobe {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gaussians {
     /// The lobes, anywhere on the sphere.
-    pub lobes: Vec<Lobe>,
+    pub lobes: Vec<SphericalGaussian>,
     /// b, per channel: what is left where no lobe reaches.
     pub constant: [f64; 3],
 }
@@ -61,10 +62,6 @@ impl Gaussians {
     pub(super) fn fit_mixture(lobes: usize, target: &Target, search: &Search) -> Result<Self> {
         search.run(&mixture::Mixture::new(lobes, target))
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ pub const NUMBERS: usize = 6;
 
 /// The lobes of a grid of `rows` × `columns` on the upper hemisphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Grid {
+pub struct LobeGrid {
     /// Along the polar angle; the *second* of `row_col_gaussian_dims`.
     pub rows: usize,
     /// Along the azimuth; the *first* of `row_col_gaussian_dims`.
@@ -27,7 +27,7 @@ struct Lobe {
     azimuth_derivative: f64,
 }
 
-impl Grid {
+impl LobeGrid {
     /// From the reference's option `row_col_gaussian_dims`, in its order.
     #[doc(hidden)]
     pub fn from_row_col_gaussian_dims([columns, rows]: [usize; 2]) -> Self {

@@ -2,9 +2,10 @@
 //! shapes are searched (variable projection; Golub & Pereyra 1973). MODEL (48).
 
 use super::descent::Problem;
-use super::{Gaussians, Lobe, shape};
+use super::{Gaussians, SphericalGaussian, shape};
 use crate::baseline::least_squares;
 use crate::baseline::target::Target;
+use veni_light::vector::dot;
 
 /// Added to the Gram matrix (whose lobes have diagonal elements of about 1/4λ): two equal lobes share their amplitude
 /// instead of having none.
@@ -54,7 +55,7 @@ impl Problem for Separable<'_> {
             }
             loss += w * residual.iter().map(|r| r * r).sum::<f64>() / 3.0;
             let by_sum = residual.map(|r| 2.0 / 3.0 * w * r);
-            pull.extend(row.iter().zip(&best[..self.lobes]).map(|(e, a)| e * super::dot(by_sum, *a)));
+            pull.extend(row.iter().zip(&best[..self.lobes]).map(|(e, a)| e * dot(by_sum, *a)));
         }
         loss += RIDGE / 3.0 * best.iter().flatten().map(|a| a * a).sum::<f64>();
         (loss, shape::gradient(x, directions, &pull))
@@ -64,7 +65,9 @@ impl Problem for Separable<'_> {
         let best = self.amplitudes(&shape::matrix(x, &self.target.directions));
         let lobes = shape::lobes(x).zip(&best);
         Gaussians {
-            lobes: lobes.map(|((axis, sharpness), a)| Lobe { axis, sharpness, amplitude: *a }).collect(),
+            lobes: lobes
+                .map(|((axis, sharpness), a)| SphericalGaussian { axis, sharpness, amplitude: *a })
+                .collect(),
             constant: best[self.lobes],
         }
     }

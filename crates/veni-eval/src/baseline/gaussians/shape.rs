@@ -1,16 +1,13 @@
 //! Axes and sharpnesses as free numbers, and what a loss says about them. MODEL (51, 52).
 
-use super::dot;
+use veni_light::vector::{dot, length, unit};
 
 /// Free numbers per lobe: a vector along the axis, of any length, and ln λ.
 pub(super) const FREE: usize = 4;
 
 /// Unit axes and sharpnesses.
 pub(super) fn lobes(x: &[f64]) -> impl Iterator<Item = ([f64; 3], f64)> {
-    x.chunks_exact(FREE).map(|v| {
-        let length = dot([v[0], v[1], v[2]], [v[0], v[1], v[2]]).sqrt();
-        ([v[0] / length, v[1] / length, v[2] / length], v[3].exp())
-    })
+    x.chunks_exact(FREE).map(|v| (unit([v[0], v[1], v[2]]), v[3].exp()))
 }
 
 /// The lobes e^{λ(⟨μ,d⟩ − 1)} at every direction and a last column of ones, `[directions, lobes + 1]`.
@@ -40,7 +37,7 @@ pub(super) fn gradient(x: &[f64], directions: &[[f64; 3]], pull: &[f64]) -> Vec<
     let mut out = Vec::with_capacity(x.len());
     for ((v, (axis, sharpness)), [gx, gy, gz, total]) in x.chunks_exact(FREE).zip(&lobes).zip(sums) {
         let along = dot(*axis, [gx, gy, gz]);
-        let length = dot([v[0], v[1], v[2]], [v[0], v[1], v[2]]).sqrt();
+        let length = length([v[0], v[1], v[2]]);
         out.extend([gx, gy, gz].iter().zip(axis).map(|(g, a)| sharpness * (g - along * a) / length));
         out.push(sharpness * (along - total));
     }

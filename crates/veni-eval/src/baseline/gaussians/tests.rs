@@ -2,7 +2,7 @@ use super::descent::Problem;
 use super::mixture::Mixture;
 use super::separable::Separable;
 use super::*;
-use crate::baseline::Space;
+use crate::baseline::TargetSpace;
 use veni_light::random::{Purpose, stream};
 use veni_light::sphere::Equirect;
 
@@ -34,10 +34,10 @@ fn check_gradient(problem: &impl Problem) {
 #[test]
 fn gradients_agree_with_finite_differences() {
     let grid = Equirect::new(12, 6);
-    for space in [Space::Log, Space::Linear] {
+    for space in [TargetSpace::Log, TargetSpace::Linear] {
         check_gradient(&Separable::new(3, &Target::new(grid, &image(grid), space).unwrap()));
     }
-    check_gradient(&Mixture::new(3, &Target::new(grid, &image(grid), Space::Log).unwrap()));
+    check_gradient(&Mixture::new(3, &Target::new(grid, &image(grid), TargetSpace::Log).unwrap()));
 }
 
 #[test]
@@ -45,14 +45,14 @@ fn lobes_are_found_again() {
     let grid = Equirect::new(32, 16);
     let truth = Gaussians {
         lobes: vec![
-            Lobe { axis: [0.6, 0.0, 0.8], sharpness: 12.0, amplitude: [2.0, 1.5, 1.0] },
-            Lobe { axis: [0.0, -0.8, -0.6], sharpness: 3.0, amplitude: [-1.0, 0.3, 0.5] },
+            SphericalGaussian { axis: [0.6, 0.0, 0.8], sharpness: 12.0, amplitude: [2.0, 1.5, 1.0] },
+            SphericalGaussian { axis: [0.0, -0.8, -0.6], sharpness: 3.0, amplitude: [-1.0, 0.3, 0.5] },
         ],
         constant: [0.1, 0.2, -0.3],
     };
     let directions: Vec<_> = grid.directions().into_iter().map(|d| d.map(f64::from)).collect();
     let image: Vec<f32> = truth.values(&directions).as_flattened().iter().map(|v| *v as f32).collect();
-    let target = Target::new(grid, &image, Space::Log).unwrap();
+    let target = Target::new(grid, &image, TargetSpace::Log).unwrap();
     let found = Gaussians::fit(2, &target, &Search::default()).unwrap();
     for (a, b) in found.values(&directions).as_flattened().iter().zip(&image) {
         assert!((a - f64::from(*b)).abs() < 1e-2, "{found:?}");
@@ -65,13 +65,13 @@ fn lobes_are_found_again() {
 
 #[test]
 fn the_mean_is_the_integral() {
-    let lobe = |axis, sharpness| Lobe { axis, sharpness, amplitude: [1.0, -2.0, 0.5] };
+    let lobe = |axis, sharpness| SphericalGaussian { axis, sharpness, amplitude: [1.0, -2.0, 0.5] };
     let field = Gaussians {
         lobes: vec![lobe([0.0, 0.6, 0.8], 0.2), lobe([1.0, 0.0, 0.0], 25.0)],
         constant: [0.5, 0.0, 1.0],
     };
     let grid = Equirect::new(128, 64);
-    let target = Target::new(grid, &vec![0.0; 3 * grid.len()], Space::Log).unwrap();
+    let target = Target::new(grid, &vec![0.0; 3 * grid.len()], TargetSpace::Log).unwrap();
     let sum = |c: usize| -> f64 {
         field.values(&target.directions).iter().zip(&target.weights).map(|(v, w)| w * v[c]).sum()
     };

@@ -276,7 +276,7 @@ fn alpha() {
     let image = ImageBuffer::from_fn(8, 4, |x, _| image::Rgba([100, 100, 100, if x < 2 { 0 } else { 255 }]));
     let file = File::new(&encoded(&DynamicImage::ImageRgba8(image), ImageFormat::Png));
     let Content::Display(ldr) = file.content().unwrap() else { panic!("display values") };
-    assert_eq!((ldr.unknown(), ldr.linear(Transfer::Srgb).unknown()), (0.25, 0.25));
+    assert_eq!((ldr.unknown(), ldr.linear(TransferFunction::Srgb).unknown()), (0.25, 0.25));
     assert_eq!(ldr.known().unwrap()[..3], [0.0, 0.0, 1.0]);
 }
 

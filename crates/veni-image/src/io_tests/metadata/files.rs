@@ -36,7 +36,7 @@ impl File {
     pub(super) fn linear(&self) -> (Vec<[f32; 3]>, String) {
         let (panorama, notes) = match self.content().unwrap() {
             Content::Radiance(panorama) => (panorama.clone(), panorama.notes().join("; ")),
-            Content::Display(ldr) => (ldr.linear(Transfer::Srgb), ldr.notes().join("; ")),
+            Content::Display(ldr) => (ldr.linear(TransferFunction::Srgb), ldr.notes().join("; ")),
         };
         (panorama.into_pixels(), notes)
     }

@@ -6,7 +6,7 @@ use super::super::meaning::Curve;
 use super::*;
 use crate::panorama::Panorama;
 use crate::tonemap::srgb_to_linear;
-use crate::{Content, Transfer};
+use crate::{Content, TransferFunction};
 
 const FILES: [(&str, &[u8]); 6] = [
     ("10 bits, 4:4:4, BT.2020, full", include_bytes!("files/10-bit-444-bt2020.avif")),
@@ -99,7 +99,7 @@ fn coded(folder: &Folder, changes: &[(usize, u8)]) -> (Content, [f32; 3], [f32; 
     let read = Content::read(path, &ReadOptions::default()).unwrap();
     let linear = match &read {
         Content::Radiance(panorama) => panorama.clone(),
-        Content::Display(ldr) => ldr.linear(Transfer::Srgb),
+        Content::Display(ldr) => ldr.linear(TransferFunction::Srgb),
     };
     (read, linear.pixel(40, 16), [40.0 / 63.0, 16.0 / 31.0, 128.0 / 255.0])
 }

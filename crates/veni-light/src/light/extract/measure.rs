@@ -1,8 +1,8 @@
 //! One candidate at one scale: what surrounds it, what exceeds that, and where the middle of the excess is.
 
 use super::level::{Cell, View};
-use crate::light::vector::{angle, normalised};
 use crate::luminance::{LUMINANCE, luminance};
+use crate::vector::{angle, dot, normalised};
 
 /// Excess below this part of the largest does not move the centre: what is around a light is lit by it, and not evenly.
 const CORE: f64 = 0.25;
@@ -85,8 +85,7 @@ fn ring(view: View<'_>, centre: [f64; 3], radius: f64) -> [f32; 3] {
     let inner = radius.cos();
     let mut values: [Vec<(f32, f64)>; 3] = Default::default();
     view.cap(centre, 2.0 * radius, |cell| {
-        let cosine: f64 = cell.direction.iter().zip(centre).map(|(a, b)| a * b).sum();
-        if cosine < inner {
+        if dot(cell.direction, centre) < inner {
             for (values, value) in values.iter_mut().zip(cell.radiance) {
                 values.push((value, cell.solid_angle));
             }

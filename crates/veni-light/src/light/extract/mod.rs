@@ -10,10 +10,10 @@ mod sun;
 use std::ops::Range;
 
 use crate::compact::{CompactLight, Kind, Lights};
-use crate::light::vector::{angle, dot, normalised};
 use crate::luminance::luminance;
 use crate::sphere::Equirect;
 use crate::tasks;
+use crate::vector::{angle, dot, normalised};
 pub(super) use level::Level;
 use level::{Cell, View};
 use measure::{Measured, core_centre, luminance_of, measure};

@@ -2,8 +2,8 @@
 
 use super::level::Cell;
 use super::measure::Measured;
-use crate::light::vector::{angle, dot};
 use crate::sphere::Equirect;
+use crate::vector::{angle, dot};
 
 /// Bounds what is taken about a core by what there is on the other side of it, so that the middle of what is taken is the core:
 /// surfaces are then lit from where shadows fall. What one side has more, the horizon's glow or a lit cloud, is left in the map.
@@ -62,10 +62,10 @@ impl<'a> Opposite<'a> {
 #[cfg(test)]
 mod tests {
     use crate::compact::{CompactLight, Lights};
-    use crate::light::vector::{angle, normalised};
     use crate::light::{EnvironmentMap, Light};
     use crate::luminance::luminance;
     use crate::sphere::Equirect;
+    use crate::vector::{angle, normalised};
 
     /// Irradiance of a surface by the sum over all pixels.
     fn irradiance(grid: Equirect, pixels: &[[f32; 3]], normal: [f32; 3]) -> f64 {

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use super::{CubeAxes, CubeMap};
 use crate::light::CompactLight;
-use crate::light::vector::across;
 use crate::sphere::CubeFace;
+use crate::vector::across;
 
 /// Rings, and places on each, of a disc.
 const RINGS: usize = 64;

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use super::alias::BELOW_ONE;
 use super::{Sample, Sampler};
-use crate::light::vector::across;
 use crate::light::{CompactLight, luminance};
+use crate::vector::{across, narrow, unit, wide};
 
 /// Draws the sun, as a disc, or the rest of the sky, by their power. Radiance and density are those of both together, so that a
 /// sample needs no second look.
@@ -34,7 +34,7 @@ impl<'a> SplitSampler<'a> {
         let share = if own + others > 0.0 { (own / (own + others)) as f32 } else { 0.0 };
         let half = (0.5 * f64::from(sun.radius)).sin();
         Self {
-            across: across(sun.direction.map(f64::from)).map(|v| v.map(|c| c as f32)),
+            across: across(wide(sun.direction)).map(narrow),
             radiance: sun.radiance(),
             cap: (2.0 * half * half) as f32,
             share,
@@ -99,9 +99,4 @@ impl<'a> SplitSampler<'a> {
         let radiance = [0, 1, 2].map(|c| radiance[c] + self.radiance[c]);
         Sample { direction, radiance, pdf: rest + self.share / (2.0 * PI as f32 * self.cap) }
     }
-}
-
-fn unit(v: [f32; 3]) -> [f32; 3] {
-    let length = v.iter().map(|x| x * x).sum::<f32>().sqrt();
-    v.map(|x| x / length)
 }

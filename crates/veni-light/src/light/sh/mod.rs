@@ -16,6 +16,7 @@ use super::environment::EnvironmentMap;
 use crate::compact::CompactLight;
 use crate::field::Field;
 use crate::sphere::Equirect;
+use crate::vector::{unit, wide};
 use crate::{Error, Result};
 
 pub use bands::light_bands;
@@ -75,7 +76,7 @@ impl<const L: usize> Sh<L> {
     /// A disc of constant radiance, in closed form; of a radius of 0 a point. With E = E⊥, c = cos r:
     /// c_lm = E (P_{l−1}(c) − P_{l+1}(c)) / ((2l + 1)(1 − c)) Y_lm(s).
     pub fn of_light(light: &CompactLight) -> Self {
-        let direction = unit(light.direction);
+        let direction = unit(wide(light.direction));
         let mut row = vec![0.0; Self::LEN];
         Basis::new(L).evaluate(direction, &mut row);
         let zonal = bands::of_disc(L, f64::from(light.radius));
@@ -106,7 +107,7 @@ impl<const L: usize> Sh<L> {
     /// What these coefficients say in a direction, given as any vector but 0.
     pub fn value(&self, direction: [f32; 3]) -> [f64; 3] {
         let mut row = vec![0.0; Self::LEN];
-        Basis::new(L).evaluate(unit(direction), &mut row);
+        Basis::new(L).evaluate(unit(wide(direction)), &mut row);
         self.combine(&row)
     }
 
@@ -135,12 +136,6 @@ pub fn cosine_lobe(l: usize) -> f64 {
     let ratio: f64 = (1..=l / 2).map(|k| (2 * k - 1) as f64 / (2 * k) as f64).product();
     let sign = if (l / 2) % 2 == 1 { 1.0 } else { -1.0 };
     2.0 * PI * sign * ratio / ((l as f64 + 2.0) * (l as f64 - 1.0))
-}
-
-fn unit(v: [f32; 3]) -> [f64; 3] {
-    let v = v.map(f64::from);
-    let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
-    v.map(|c| c / length)
 }
 
 #[cfg(test)]

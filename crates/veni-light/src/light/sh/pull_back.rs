@@ -4,6 +4,7 @@ use super::Sh;
 use super::pixels::Integrals;
 use crate::field::{Field, Gradient};
 use crate::sphere::Equirect;
+use crate::vector::dot;
 
 impl<const L: usize> Sh<L> {
     /// The gradient with respect to the latent of Σ ∂_lm c_lm, where `self` holds ∂, the derivative of some loss with respect to
@@ -27,7 +28,7 @@ pub fn pull_back_irradiance(field: &Field, grid: Equirect, normals: &[([f32; 3],
         let solid_angle = grid.solid_angle(index / grid.width);
         let mut weight = [0.0; 3];
         for (normal, derivative) in normals {
-            let cosine: f32 = directions[index].iter().zip(normal).map(|(d, n)| d * n).sum();
+            let cosine = dot(directions[index], *normal);
             let light = solid_angle * f64::from(cosine.max(0.0));
             weight = [0, 1, 2].map(|c| weight[c] + light * derivative[c]);
         }

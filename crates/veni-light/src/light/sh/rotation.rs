@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 
 use super::{Basis, Sh};
 use crate::light::quadrature::gauss_legendre;
+use crate::vector::dot;
 
 impl<const L: usize> Sh<L> {
     /// The same light rotated by `angle` radians about z, counter-clockwise seen from above: the pair (c_lm, c_l−m)
@@ -34,9 +35,8 @@ impl<const L: usize> Sh<L> {
     pub fn rotated(&self, rotation: [[f32; 3]; 3]) -> Self {
         for (i, a) in rotation.iter().enumerate() {
             for (j, b) in rotation.iter().enumerate() {
-                let dot: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
                 let expected = if i == j { 1.0 } else { 0.0 };
-                assert!((dot - expected).abs() <= 1e-5, "the matrix {rotation:?} is not orthogonal");
+                assert!((dot(*a, *b) - expected).abs() <= 1e-5, "the matrix {rotation:?} is not orthogonal");
             }
         }
         // back to where the light came from: the transposed matrix

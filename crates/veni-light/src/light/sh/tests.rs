@@ -8,7 +8,8 @@ const GRID: Equirect = Equirect { width: 256, height: 128 };
 /// max(0, ⟨n, a⟩) on a grid, by means over each pixel.
 fn lobe(a: [f64; 3]) -> Sh<2> {
     let fine = Equirect::new(1024, 512);
-    let pixels: Vec<_> = fine.directions().iter().map(|d| [dot(unit(*d), a).max(0.0) as f32; 3]).collect();
+    let pixels: Vec<_> =
+        fine.directions().iter().map(|d| [dot(unit(wide(*d)), a).max(0.0) as f32; 3]).collect();
     Sh::of(EnvironmentMap::new(fine, &pixels).unwrap())
 }
 
@@ -234,7 +235,9 @@ fn irradiance_is_the_cosine_integral() {
     for n in [[0.0f32, 0.0, 1.0], [0.6, -0.8, 0.0], [-0.48, 0.6, -0.64]] {
         let mut sum = 0.0;
         for (k, d) in GRID.directions().iter().enumerate() {
-            sum += GRID.solid_angle(k / 256) * dot(unit(*d), unit(n)).max(0.0) * f64::from(pixels[k][1]);
+            sum += GRID.solid_angle(k / 256)
+                * dot(unit(wide(*d)), unit(wide(n))).max(0.0)
+                * f64::from(pixels[k][1]);
         }
         let found = irradiance.value(n)[1];
         assert!((found / sum - 1.0).abs() < 3e-4, "{n:?}: {found} {sum}");

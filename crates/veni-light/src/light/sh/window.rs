@@ -2,6 +2,7 @@
 
 use super::{Basis, Sh};
 use crate::sphere::Equirect;
+use crate::vector::{unit, wide};
 
 /// The function that is kept from being negative, and what that took.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,7 +55,7 @@ impl Samples {
     fn new(order: usize) -> Self {
         let height = (8 * order).max(16);
         let directions: Vec<_> =
-            Equirect::new(2 * height, height).directions().iter().map(|d| super::unit(*d)).collect();
+            Equirect::new(2 * height, height).directions().iter().map(|d| unit(wide(*d))).collect();
         let basis = Basis::new(order);
         Self { rows: basis.matrix(&directions), len: basis.len() }
     }

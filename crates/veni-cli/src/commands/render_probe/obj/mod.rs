@@ -9,6 +9,7 @@ use clap::ValueEnum;
 use veni_fit::shade::Mesh;
 use veni_light::limits::{at_most, read_file};
 use veni_light::text;
+use veni_light::vector::{length, sub};
 
 use polygon::triangles;
 
@@ -150,8 +151,7 @@ fn far_centre(points: &[[f64; 3]]) -> [f64; 3] {
         }
     }
     let centre: [f64; 3] = std::array::from_fn(|c| 0.5 * (low[c] + high[c]));
-    let length = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
-    let size = length(std::array::from_fn(|c| high[c] - low[c]));
+    let size = length(sub(high, low));
     let is_far = length(centre) > FAR * size && centre.iter().all(|c| c.is_finite());
     if is_far { centre } else { [0.0; 3] }
 }

@@ -2,6 +2,7 @@
 
 use veni_light::Result;
 use veni_light::limits::at_most;
+use veni_light::vector::{add, cross, dot, length, sub};
 
 /// Corners of a concave polygon, as the time for its ears grows with their square: outlines of text and maps have some hundred.
 const MAX_CORNERS: u64 = 1 << 12;
@@ -63,15 +64,13 @@ impl Flat {
     /// Along Newell's normal, the sum of the corners' cross products; nothing if the polygon has no area.
     fn of(corners: &[[f64; 3]]) -> Option<Self> {
         let first = corners.first()?;
-        let from_first: Vec<[f64; 3]> =
-            corners.iter().map(|p| std::array::from_fn(|c| p[c] - first[c])).collect();
+        let from_first: Vec<[f64; 3]> = corners.iter().map(|p| sub(*p, *first)).collect();
         let mut normal = [0.0; 3];
         for (a, b) in from_first.iter().zip(from_first.iter().cycle().skip(1)) {
-            let product = cross(*a, *b);
-            (0..3).for_each(|c| normal[c] += product[c]);
+            normal = add(normal, cross(*a, *b));
         }
         let size = from_first.iter().map(|p| dot(*p, *p)).fold(0.0, f64::max);
-        let length = dot(normal, normal).sqrt();
+        let length = length(normal);
         let nothing = NOTHING * size;
         if !length.is_finite() || length <= nothing {
             return None;
@@ -107,14 +106,6 @@ impl Flat {
         };
         self.turn(ear) > self.nothing && !left.iter().any(|p| is_inside(*p) && !is_corner(*p))
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@
 
 use burn::tensor::{Device, DeviceType};
 
-use super::Opened;
+use super::WorkingDevice;
 use crate::{Error, Result};
 
 /// Device `number`, from 0.
-pub(super) fn open(number: usize) -> Result<Opened> {
+pub(super) fn open(number: usize) -> Result<WorkingDevice> {
     let found: Vec<_> = Device::enumerate(DeviceType::Cuda).into_iter().collect();
     let device = found.get(number).cloned().ok_or_else(|| match found.len() {
         0 => Error::unsupported(
@@ -19,5 +19,5 @@ pub(super) fn open(number: usize) -> Result<Opened> {
         )),
     })?;
     let name = device.identity().map_or_else(|| format!("CUDA device {number}"), |identity| identity.name);
-    Ok(Opened { device, name, software: false })
+    Ok(WorkingDevice { device, name, software: false })
 }

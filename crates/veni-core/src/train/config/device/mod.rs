@@ -73,7 +73,7 @@ pub enum DeviceKind {
 
 /// A device that was found to work.
 #[derive(Clone, Debug)]
-pub struct Opened {
+pub struct WorkingDevice {
     /// Without gradient tracking.
     pub device: Device,
     /// The adapter's own name; of a processor burn's name of the backend.
@@ -116,7 +116,7 @@ impl DeviceKind {
     ///
     /// # Errors
     /// [`Error::Unsupported`](crate::Error::Unsupported) if it is not compiled in, or this machine has none.
-    pub fn open(self) -> Result<Opened> {
+    pub fn open(self) -> Result<WorkingDevice> {
         self.open_number(None)
     }
 
@@ -126,7 +126,7 @@ impl DeviceKind {
     ///
     /// # Errors
     /// As [`DeviceKind::open`], naming the number.
-    pub fn open_all(self, devices: &Devices) -> Result<Vec<Opened>> {
+    pub fn open_all(self, devices: &Devices) -> Result<Vec<WorkingDevice>> {
         if *devices == Devices::default() {
             return Ok(vec![self.open()?]);
         }
@@ -137,7 +137,7 @@ impl DeviceKind {
         not(any(feature = "wgpu", feature = "cuda")),
         allow(unused_variables, reason = "processors have no numbers")
     )]
-    fn open_number(self, number: Option<usize>) -> Result<Opened> {
+    fn open_number(self, number: Option<usize>) -> Result<WorkingDevice> {
         match self {
             Self::Flex => Ok(processor(Device::flex(), "flex")),
             #[cfg(feature = "ndarray")]
@@ -157,8 +157,8 @@ impl DeviceKind {
     }
 }
 
-fn processor(device: Device, name: &str) -> Opened {
-    Opened { device, name: name.into(), software: false }
+fn processor(device: Device, name: &str) -> WorkingDevice {
+    WorkingDevice { device, name: name.into(), software: false }
 }
 
 #[cfg(not(all(feature = "ndarray", feature = "wgpu", feature = "cuda")))]

@@ -7,13 +7,13 @@ use burn::tensor::wgpu::WgpuBackend;
 use burn::tensor::wgpu::wgpu::DeviceType;
 use burn::tensor::{Device, DeviceKind};
 
-use super::Opened;
+use super::WorkingDevice;
 use crate::{Error, Result};
 
 /// Graphics card `number`, from 0. Without one the adapter that wgpu prefers; `CUBECL_WGPU_DEFAULT_DEVICE` (e.g.
 /// `IntegratedGpu(0)`) names another.
-pub(super) fn open(number: Option<usize>) -> Result<Opened> {
-    type Found = Result<Opened, String>;
+pub(super) fn open(number: Option<usize>) -> Result<WorkingDevice> {
+    type Found = Result<WorkingDevice, String>;
     // burn opens an adapter once; a second request would be refused
     static OPENED: Mutex<BTreeMap<Option<usize>, Found>> = Mutex::new(BTreeMap::new());
     let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -28,7 +28,7 @@ pub(super) fn open(number: Option<usize>) -> Result<Opened> {
         };
         let (device, setup) = options.init_with_setup().map_err(|error| error.to_string())?;
         let info = setup.adapter.get_info();
-        Ok(Opened { device, name: info.name, software: info.device_type == DeviceType::Cpu })
+        Ok(WorkingDevice { device, name: info.name, software: info.device_type == DeviceType::Cpu })
     });
     found.clone().map_err(|cause| match number {
         Some(number) => Error::unsupported(format!(
