@@ -41,7 +41,7 @@ pub use fit::{
     Achieved, Best, DecoderPasses, FitConfig, FitResult, FitTarget, LatentDecoder, LatentGradient,
     LinearTarget, LobePlan, Method, Objective, PanoramaLoss, Plateau, Received, WIDEST_LIGHT, best_light,
     best_linear, best_of, fit, fit_linear, fit_lobes, fit_rendered, fit_with, from_each, likely_linear,
-    likely_searches, matching_exposure, random_starts,
+    likely_searches, matching_exposure, random_starts, refine_linear,
 };
 pub use observation::Observation;
 pub use veni_light::{Error, Result};

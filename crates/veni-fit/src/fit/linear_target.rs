@@ -189,7 +189,7 @@ impl LinearTarget {
 
     /// The same wanted of a light that is decoded at half the width and half the height: pixels stand for those that they cover.
     /// None of an odd number of columns or rows, or of few.
-    pub(crate) fn coarser(&self) -> Option<Self> {
+    pub fn coarser(&self) -> Option<Self> {
         let Equirect { width, height } = self.grid;
         if width % 2 + height % 2 != 0 || height <= COARSEST {
             return None;

@@ -26,7 +26,7 @@ pub use linear::{fit_linear, likely_linear, likely_searches};
 pub use linear_target::{Achieved, LinearTarget, Received};
 pub use lobes::{LobePlan, WIDEST_LIGHT, fit_lobes};
 pub use rendered::{fit_rendered, matching_exposure};
-pub use starts::{Best, best_light, best_linear, best_of, from_each, random_starts};
+pub use starts::{Best, best_light, best_linear, best_of, from_each, random_starts, refine_linear};
 pub use target::FitTarget;
 
 use crate::{Error, Result};

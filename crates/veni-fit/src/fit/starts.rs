@@ -97,13 +97,38 @@ pub fn best_linear(
     };
     from_each(starts, config, &mut count, |start, observer| {
         let fit = if std::mem::take(&mut first) { likely_linear } else { fit_linear };
-        let mut found = fit(decoder, target, Some(prior), start, config, observer)?;
-        let scale = config.prior / prior.latent_vectors().max(1) as f64;
-        for (loss, latent) in found.last.iter_mut().zip(&found.latents) {
-            *loss += scale * prior.energy(&latent.vectors).0;
-        }
-        Ok(found)
+        let found = fit(decoder, target, Some(prior), start, config, observer)?;
+        Ok(with_prior(found, prior, config))
     })
+}
+
+/// [`fit_linear`] from latents that are near already, as what [`best_linear`] found for a coarser target. Losses include the prior.
+///
+/// # Errors
+/// As [`fit_linear`].
+///
+/// # Panics
+/// If there is no start.
+pub fn refine_linear(
+    decoder: &dyn LatentDecoder,
+    target: &LinearTarget,
+    prior: &Prior,
+    starts: &[Latent],
+    config: &FitConfig,
+    observer: &mut dyn FnMut(u64, f64),
+) -> Result<Best> {
+    from_each(starts, config, observer, |start, observer| {
+        Ok(with_prior(fit_linear(decoder, target, Some(prior), start, config, observer)?, prior, config))
+    })
+}
+
+/// The prior's part added to the last losses.
+fn with_prior(mut found: FitResult, prior: &Prior, config: &FitConfig) -> FitResult {
+    let scale = config.prior / prior.latent_vectors().max(1) as f64;
+    for (loss, latent) in found.last.iter_mut().zip(&found.latents) {
+        *loss += scale * prior.energy(&latent.vectors).0;
+    }
+    found
 }
 
 /// The best of the fits that `fit` makes from each start; it gets the starts one by one, and a callback as [`fit_with`]'s.

@@ -1,6 +1,6 @@
 //! The sun of a light of which only harmonics are known.
 
-use veni_fit::Best;
+use veni_fit::{Achieved, Best};
 use veni_light::light::sh::Basis;
 use veni_light::light::{CompactLight, LUMINANCE, Lights};
 use veni_light::vector::unit;
@@ -40,17 +40,47 @@ impl BandSun {
         Basis::new(count.isqrt() - 1).evaluate(self.direction, &mut row);
         row.into_iter().map(|y| self.most.map(|e| share * e * y)).collect()
     }
+}
 
-    /// A share of the sun into every latent that was fitted to the rest, at its exposure.
-    pub(super) fn put_into(&self, share: f64, best: &mut Best) {
+/// Harmonics parted into those of a sun and the rest.
+pub(super) struct SunAndRest {
+    sun: BandSun,
+    share: f64,
+    own: Vec<[f64; 3]>,
+    /// What is left without the sun.
+    pub(super) rest: Vec<[f64; 3]>,
+    /// √(Σ rest²/Σ all²): what an error of the rest is as one of all.
+    pub(super) part: f64,
+}
+
+impl SunAndRest {
+    /// With a share of the strongest sun.
+    pub(super) fn new(sun: BandSun, share: f64, harmonics: &[[f64; 3]]) -> Self {
+        let own = sun.harmonics(share, harmonics.len());
+        let rest = harmonics.iter().zip(&own).map(|(all, sun)| [0, 1, 2].map(|c| all[c] - sun[c]));
+        let rest: Vec<[f64; 3]> = rest.collect();
+        let part = norm(&rest) / norm(harmonics);
+        Self { sun, share, own, rest, part }
+    }
+
+    /// The sun into every latent that was fitted to the rest, at its exposure, and into what they have.
+    pub(super) fn put_into(&self, best: &mut Best, achieved: &mut Achieved) {
         for latent in best.all.iter_mut().chain([&mut best.latent]) {
-            let factor = share * f64::from(-latent.log_exposure).exp();
-            let irradiance = self.most.map(|e| (e * factor) as f32);
-            let sun =
-                CompactLight::new(self.direction.map(|v| v as f32), irradiance, CompactLight::SUN_RADIUS);
+            let factor = self.share * f64::from(-latent.log_exposure).exp();
+            let irradiance = self.sun.most.map(|e| (e * factor) as f32);
+            let direction = self.sun.direction.map(|v| v as f32);
+            let sun = CompactLight::new(direction, irradiance, CompactLight::SUN_RADIUS);
             latent.lights = Lights::new(Some(sun), []);
         }
+        for (sum, sun) in achieved.harmonics.iter_mut().zip(&self.own) {
+            *sum = [0, 1, 2].map(|c| sum[c] + sun[c]);
+        }
+        achieved.harmonics_error = achieved.harmonics_error.map(|error| error * self.part);
     }
+}
+
+fn norm(values: &[[f64; 3]]) -> f64 {
+    values.as_flattened().iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]

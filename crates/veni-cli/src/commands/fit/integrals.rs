@@ -9,11 +9,12 @@ use serde_json::{Value, json};
 use veni_fit::targets::{read_harmonics, read_surfaces};
 use veni_fit::{
     Achieved, Best, FitConfig, LinearTarget, Received, best_linear, likely_searches, random_starts,
+    refine_linear,
 };
 use veni_light::latent::Latent;
 use veni_light::sphere::Equirect;
 
-use super::band_sun::{BandSun, SHARES};
+use super::band_sun::{BandSun, SHARES, SunAndRest};
 use super::model::FitModel;
 use super::settings::{Settings, Start};
 use crate::numbers::positive;
@@ -54,6 +55,15 @@ pub(super) struct Integrals {
 
 /// Harmonics that are further from what is wanted than this are tried with a sun.
 const NEAR: f64 = 0.01;
+
+/// How a latent is looked for.
+#[derive(Clone, Copy)]
+enum Search {
+    /// From wherever the starts are.
+    Whole,
+    /// From what is right already on fewer pixels.
+    Near,
+}
 
 /// What is to be fitted.
 struct Wanted {
@@ -117,32 +127,38 @@ impl Integrals {
         let Wanted { target, harmonics, normals } = self.read(grid)?;
         let config = settings.for_integrals(model.decoder().folded().is_some())?;
         let starts = starts(settings, model)?;
-        let found = |target: &LinearTarget| -> Result<(Best, Achieved)> {
+        // where the light is a quarter of the pixels: what it takes to be told from what it does not take
+        let lead = target.coarser().unwrap_or_else(|| target.clone());
+        let explored = |target: &LinearTarget| -> Result<(Best, Achieved)> {
             let mut starts = starts.clone();
             for start in &mut starts {
-                start.log_exposure += target.matching_exposure(&model.decode(grid, start)?);
+                start.log_exposure += target.matching_exposure(&model.decode(target.grid(), start)?);
             }
-            let best = Self::search(target, &starts, &config, model, report)?;
-            let achieved = target.achieved(&model.decode(grid, &best.latent)?);
+            let best = Self::search(target, &starts, Search::Whole, &config, model, report)?;
+            let achieved = target.achieved(&model.decode(target.grid(), &best.latent)?);
             Ok((best, achieved))
         };
-        let (mut best, mut achieved) = found(&target)?;
+        let (mut best, achieved) = explored(&lead)?;
         // the vectors of a model that was trained without suns cannot be as bright on one side
         let sun = BandSun::new(&harmonics).filter(|_| normals.is_empty() && model.prior().sun().is_some());
+        let (mut least, mut lit) = (achieved.harmonics_error, None);
         for share in SHARES {
-            let (Some(sun), Some(NEAR..)) = (sun, achieved.harmonics_error) else { break };
-            let own = sun.harmonics(share, harmonics.len());
-            let rest = harmonics.iter().zip(&own).map(|(all, sun)| [0, 1, 2].map(|c| all[c] - sun[c]));
-            let rest: Vec<[f64; 3]> = rest.collect();
-            let (mut other, mut reached) = found(&LinearTarget::new(grid).harmonics(&rest)?)?;
-            let error = reached.harmonics_error.map(|error| error * norm(&rest) / norm(&harmonics));
-            if error < achieved.harmonics_error {
-                sun.put_into(share, &mut other);
-                reached.harmonics.iter_mut().zip(&own).for_each(|(sum, sun)| {
-                    *sum = [0, 1, 2].map(|c| sum[c] + sun[c]);
-                });
-                (best, achieved) = (other, Achieved { harmonics_error: error, ..reached });
+            let (Some(sun), Some(NEAR..)) = (sun, least) else { break };
+            let parted = SunAndRest::new(sun, share, &harmonics);
+            let (other, reached) = explored(&LinearTarget::new(lead.grid()).harmonics(&parted.rest)?)?;
+            let error = reached.harmonics_error.map(|error| error * parted.part);
+            if error < least {
+                (best, least, lit) = (other, error, Some(parted));
             }
+        }
+        let target = match &lit {
+            Some(parted) => LinearTarget::new(grid).harmonics(&parted.rest)?,
+            None => target,
+        };
+        let mut best = Self::search(&target, &best.all, Search::Near, &config, model, report)?;
+        let mut achieved = target.achieved(&model.decode(grid, &best.latent)?);
+        if let Some(parted) = &lit {
+            parted.put_into(&mut best, &mut achieved);
         }
         let mut reached = Reached { best, achieved, normals, seconds: 0.0 };
         let factor = self.scale(model, &mut reached.best)?;
@@ -155,17 +171,21 @@ impl Integrals {
     fn search(
         target: &LinearTarget,
         starts: &[Latent],
+        search: Search,
         config: &FitConfig,
         model: &FitModel,
         report: Report,
     ) -> Result<Best> {
         let (prior, vectors) = (model.prior(), model.latent_vectors());
         let progress = ProgressBars::new(report);
-        // the first start is led by weights of the prior and by resolutions
-        let searches = likely_searches(target) + starts.len() as u64 - 1;
+        let (fit, searches): (fn(_, _, _, _, _, _) -> _, _) = match search {
+            // the first start is led by weights of the prior and by resolutions
+            Search::Whole => (best_linear, likely_searches(target) + starts.len() as u64 - 1),
+            Search::Near => (refine_linear, starts.len() as u64),
+        };
         progress.begin("", "step", Some(config.most_updates(vectors) * searches));
         let mut observer = |step, loss| progress.advance(step, &format!("loss {loss:.6}"));
-        let best = best_linear(model.decoder(), target, &prior, starts, config, &mut observer);
+        let best = fit(model.decoder(), target, &prior, starts, config, &mut observer);
         progress.end();
         Ok(best?)
     }
@@ -228,10 +248,6 @@ impl Integrals {
         });
         Ok((line, value))
     }
-}
-
-fn norm(values: &[[f64; 3]]) -> f64 {
-    values.as_flattened().iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
 /// Where the search begins: at 0, and at random if more starts are asked for.
