@@ -9,7 +9,7 @@ use super::Cli;
 use crate::features::{GPU, LEARN};
 
 /// Options of cargo and other programs, which documents and messages name too.
-const FOREIGN: [&str; 42] = [
+const FOREIGN: [&str; 43] = [
     "allocator",
     "array",
     "balls",
@@ -39,6 +39,7 @@ const FOREIGN: [&str; 42] = [
     "picture",
     "record",
     "release",
+    "runs",
     "same",
     "sampler",
     "samples",
